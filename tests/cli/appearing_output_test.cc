@@ -19,8 +19,9 @@ class AppearingOutput : public CommandLine {
     const timespec t{ms / 1000, ms % 1000 * 1000000};
     nanosleep(&t, nullptr);
   }
-  // Starts a command. Creates the file `appears` once the command has created `sign`, which it does
-  // after its checks. Expects that the command fails and that the file is kept.
+  // Starts a command, and waits until it has created the file `sign`. Commands create this file
+  // after they have checked that the output does not exist. Then creates the file `appears`, as
+  // another program would. Expects that the command fails and keeps `appears`.
   void expect_kept(const std::string& appears, const std::string& sign,
                    const std::vector<std::string>& args) {
     SCOPED_TRACE(args[0] + ": " + appears);
@@ -52,8 +53,9 @@ TEST_F(AppearingOutput, IsKept) {
   expect_kept("g", "g.partial", {"generate", "soup", "g", "--triangles", "5000000"});
 }
 
-// render creates no file until the picture is complete, so the test waits 1.5 s instead of for a
-// file. The command fails, and the file of the other program is kept.
+// Before the picture is complete, render creates no file that could show that its checks are done.
+// So the test creates the output after 1.5 s. The command fails and keeps the file of the other
+// program.
 TEST_F(AppearingOutput, OfRenderIsKept) {
   const pid_t pid = start(
       {"render", "s.vdag", "-o", "r.png", "--size", "256x256", "--threads", "1", "--samples", "4"});

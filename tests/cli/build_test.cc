@@ -16,7 +16,7 @@ class BuildCommand : public CommandLine {
   }
 };
 
-// The report has the documented names, and its values agree with the file.
+// The report has these documented members, and their values agree with the file.
 TEST_F(BuildCommand, ReportHasTheDocumentedNames) {
   const Json report = build();
   for (const char* name :
@@ -82,7 +82,8 @@ TEST_F(BuildCommand, PrintsATextReport) {
   EXPECT_NE(answer.err.find("build"), std::string::npos);
 }
 
-// Run options do not change the bytes; geometry options do.
+// Run options, such as --threads, do not change the bytes of the file. Options that select the
+// geometry do.
 TEST_F(BuildCommand, OnlyGeometryOptionsChangeTheBytes) {
   const std::string sha256 = build()["sha256"];
   const std::string bytes = contents("m.vdag");
@@ -100,7 +101,8 @@ TEST_F(BuildCommand, OnlyGeometryOptionsChangeTheBytes) {
   EXPECT_GT(part["dropped"]["outside"], 0);
 }
 
-// Numbers of voxels can be written with k and M.
+// A resolution can have the unit k, K or Ki, all of which mean 1024. Other texts are refused, and
+// the error names the expected values.
 TEST_F(BuildCommand, TakesResolutionsWithUnits) {
   for (const char* resolution : {"1k", "1K", "1Ki", "1024"})
     EXPECT_EQ(run_json({"build", "m.glb", "-r", resolution, "-o", "m.vdag"})["resolution"], 1024);
@@ -112,7 +114,8 @@ TEST_F(BuildCommand, TakesResolutionsWithUnits) {
   expect_error(2, "4096 or 4k", {"extract", "m.vdag", "--resolution", "k", "-o", "f.vdag"});
 }
 
-// A voxel size alone gives the smallest grid in which the scene fits. The sponge has the edge 9.
+// Without a resolution, --voxel-size selects the smallest grid in which the scene fits. The edge of
+// the scene, a Menger sponge, is 9.
 TEST_F(BuildCommand, FindsTheResolutionOfAVoxelSize) {
   const struct {
     const char* voxel_size;
@@ -148,7 +151,8 @@ TEST_F(BuildCommand, KeepsResultsOfOtherScenes) {
   // The same scene from another folder.
   const std::string path = folder_.path() + "/m.glb", output = folder_.path() + "/m.vdag";
   EXPECT_EQ(run({"build", path, "-r", "64", "-o", output}).status, 0);
-  // Without a report, the scene of a result is unknown.
+  // Without a report next to the result, its scene is unknown. So the build does not replace the
+  // result.
   ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", "m.vdag", "--report", "none"}).status, 0);
   ASSERT_EQ(remove(folder_.file("m.vdag.report.json").c_str()), 0);
   expect_error(2, "no report shows that n.glb is its scene", other);
@@ -194,7 +198,7 @@ TEST_F(BuildCommand, IsQuiet) {
   EXPECT_NE(run({"verify", "m.vdag"}).err, "");
 }
 
-// Options can come from a file. Options on the command line take precedence.
+// Options are read from the file that --config names. Options on the command line take precedence.
 TEST_F(BuildCommand, ReadsOptionsFromAFile) {
   put("options.toml", "resolution = 32\nhash-bits = 16\n");
   const Json report = run_json({"build", "m.glb", "-o", "m.vdag", "--config", "options.toml"});
@@ -209,7 +213,8 @@ TEST_F(BuildCommand, ReadsOptionsFromAFile) {
   expect_error(2, "resolutoin", {"build", "m.glb", "-o", "x.vdag", "--config", "wrong.toml"});
 }
 
-// An invalid value is an error that names the option or the limit, and leaves no file.
+// A build with an invalid value fails with an error that names the option or the limit. It leaves
+// no file.
 TEST_F(BuildCommand, RefusesWrongOptions) {
   const struct {
     std::vector<std::string> options;

@@ -50,7 +50,7 @@ class Client : public CommandLine {
       if (job.at("id") == id) return job.at("state");
     return "";
   }
-  // Waits up to a minute for the state, because a running job takes a moment to stop.
+  // Expects that the job reaches this state within a minute. A running job takes a moment to stop.
   void expect_state_eventually(const std::string& id, const std::string& expected) {
     for (int i = 0; i < 1200 && state(id) != expected; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -127,7 +127,8 @@ TEST_F(Client, UploadsTheMissingPart) {
   EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), 2 * scene.size());
 }
 
-// A download resumes a partial file, and detects a partial file with wrong bytes.
+// A download reads only the missing bytes if a partial file exists. If the partial file has wrong
+// bytes, the download fails and removes it.
 TEST_F(Client, ResumesADownload) {
   const Json job = run_json({"submit", "m.glb", "-r", "128", "--wait"});
   const std::string id = job["id"], sha256 = job["result"]["sha256"];
@@ -210,7 +211,7 @@ TEST_F(Client, SubmitsEverySceneFormat) {
   }
 }
 
-// Errors have the exit statuses of docs/errors.md.
+// Commands that fail have the exit statuses of docs/errors.md.
 TEST_F(Client, ReportsErrors) {
   expect_error(3, "no ", {"watch", "0123456789abcdef"});
   expect_error(2, "16 hex digits", {"cancel", "../scenes"});

@@ -42,7 +42,8 @@ TEST_F(Combine, UnionEqualsOneBuild) {
     EXPECT_EQ(combined[name], info[name]) << name;
 }
 
-// The other operations agree with diff, which counts the voxels that only one file has.
+// The voxel counts of --minus, --xor and --and agree with the counts of diff, which counts the
+// voxels that only one of the files has.
 TEST_F(Combine, AgreesWithDiff) {
   const Json diff = Json::parse(run({"diff", "a.vdag", "b.vdag", "--json"}).out);
   const auto voxels = [&](const char* operation) {

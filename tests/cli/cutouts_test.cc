@@ -8,7 +8,8 @@ namespace {
 
 using voxdag::test::SceneBuilder;
 
-// A slanted quad. The image is green, and hidden where u > 0.5. Hidden texels are red.
+// Returns a slanted quad with an image whose left half is green and opaque. The right half, where u
+// > 0.5, is red and fully transparent, so that red never shows.
 SceneBuilder half_quad(const char* alpha_mode) {
   SceneBuilder scene;
   const int positions = scene.add_positions({0, 0, 0, 4, 0, 0, 4, 4.5f, 1, 0, 4.5f, 1});

@@ -14,7 +14,8 @@ class Edit : public CommandLine {
                 0);
     build({"a.glb"}, "a.vdag");
   }
-  // Builds on a grid with voxels of edge 16. `shift` moves the scene, in voxels.
+  // Builds in a grid of 128 voxels per edge; the edge of a voxel is 16. `shift` moves the scene
+  // relative to the grid, in voxels.
   Json build(std::vector<std::string> scenes, const std::string& output,
              const std::array<int, 3>& shift = {}, const std::vector<std::string>& options = {}) {
     scenes.insert(scenes.begin(), "build");
@@ -33,7 +34,8 @@ class Edit : public CommandLine {
   }
 };
 
-// A file that is combined at an offset equals a build of the moved scene.
+// With --offset, combine moves the voxels of the second file. The moved file equals a build of the
+// moved scene.
 TEST_F(Edit, OffsetEqualsAMovedScene) {
   build({"a.glb"}, "moved.vdag", {3, 0, -5});
   const Json same = run_json(
@@ -56,7 +58,7 @@ TEST_F(Edit, OffsetOutOfTheGrid) {
   EXPECT_GT(clipped["clipped_voxels"], 0);
 }
 
-// Adding a scene equals one build of both scenes.
+// The result of --add equals one build of both scenes.
 TEST_F(Edit, AddEqualsOneBuild) {
   const Json both = build({"a.glb", "b.glb"}, "both.vdag");
   const Json added = run_json({"edit", "a.vdag", "--add", "b.glb", "-o", "c.vdag"});
@@ -64,7 +66,8 @@ TEST_F(Edit, AddEqualsOneBuild) {
   expect_equal("c.vdag", "both.vdag");
 }
 
-// Pasting what a cut removed gives the same file, also through a cropped file.
+// A box is extracted to a cropped file and cut from the original file. Pasting the cropped file
+// into the hole restores the original bytes.
 TEST_F(Edit, CutAndPaste) {
   const std::string region = "32,0,64,64,32,96";
   run_json({"edit", "a.vdag", "--cut", "box:" + region, "-o", "hole.vdag"});
@@ -72,7 +75,8 @@ TEST_F(Edit, CutAndPaste) {
   EXPECT_LT(run_json({"info", "part.vdag"})["resolution"], 128);
   run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,0,64", "-o", "c.vdag"});
   expect_equal("c.vdag", "a.vdag");
-  // The edits are applied in the order cut, add, paste, in one command too.
+  // One command applies its edits in the order cut, add, paste, whatever the order of its options.
+  // So it cuts the box first and then restores it.
   run_json(
       {"edit", "a.vdag", "--paste", "part.vdag@32,0,64", "--cut", "box:" + region, "-o", "d.vdag"});
   expect_equal("d.vdag", "a.vdag");

@@ -79,7 +79,8 @@ TEST_F(Extract, Report) {
   EXPECT_TRUE(contents("c.vdag") == contents("d.vdag"));
 }
 
-// A refused extract leaves no files, and overwrites no file that it must not overwrite.
+// A refused extract leaves no files. It overwrites neither its input nor, without --force, any
+// existing file.
 TEST_F(Extract, Refusals) {
   put("mine.txt", "not a DAG");
   expect_error(2, "mine.txt", {"extract", "s.vdag", "-o", "mine.txt"});
@@ -107,7 +108,8 @@ TEST_F(Extract, Refusals) {
   EXPECT_EQ(others, 0u);
 }
 
-// Options that extract and export share select the same number of voxels.
+// With the same options --resolution, --region, --world and --level, extract and export select the
+// same number of voxels.
 TEST_F(Extract, SelectionsOfExports) {
   const std::vector<std::vector<std::string>> selections = {
       {"--resolution", "32"},

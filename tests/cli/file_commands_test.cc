@@ -61,8 +61,9 @@ TEST_F(FileCommands, VerifyAgainstAnotherScene) {
   EXPECT_EQ(answer.status, 4) << answer.err;
 }
 
-// verify --against bakes the colors of some regions again. With the file's scene they are equal.
-// With another scene the command fails.
+// verify --against computes the colors of some regions again from the scene. They equal the file's
+// colors if the scene is the one from which the file was built. With another scene the command
+// fails.
 TEST_F(FileCommands, VerifyComparesColors) {
   for (const char* colors : {"--colors", "--json"}) {
     const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";
@@ -180,7 +181,7 @@ TEST_F(FileCommands, RenderRefusesWhatTakesTooMuchMemory) {
          "16384x16384", "1GiB");
   expect(8, "or a higher --memory", "1100x1000", "64MiB");
   expect(3, "none.vdag", "1000x1000", "64MiB");
-  // Distances need less memory than a picture.
+  // --depth needs less memory per pixel than a picture, so more pixels fit in 64 MiB.
   expect(8, "2900x2900 takes 64.", "2900x2900", "64MiB", "--depth");
   expect(3, "none.vdag", "2800x2900", "64MiB", "--depth");
   expect(2, "at least 64MiB", "64x64", "63MiB");
@@ -209,7 +210,7 @@ TEST_F(FileCommands, RenderMeasuresDistances) {
   expect_error(2, "are both 'x.png'", {"render", "m.vdag", "-o", "x.png", "--depth", "x.png"});
 }
 
-// The estimate has a range for every value, and plan builds nothing.
+// plan estimates a range for every value of a build, and builds nothing.
 TEST_F(FileCommands, PlanNames) {
   const Json plan = run_json({"plan", "m.glb", "-r", "1024"});
   for (const char* name : {"voxels", "svo_nodes", "dag_nodes", "file_bytes", "disk_bytes",
@@ -225,7 +226,8 @@ TEST_F(FileCommands, PlanNames) {
   EXPECT_FALSE(exists("m.glb.work"));
 }
 
-// The estimate of a solid has its interior. The warnings about its surface come from the pilot.
+// The plan of a solid estimates the number of voxels in its interior. It also has the warnings
+// about the surface, which come from a build on a coarser grid (the pilot).
 TEST_F(FileCommands, PlanOfASolid) {
   const Json solid = run_json({"plan", "m.glb", "-r", "256", "--solid", "winding"})["solid"];
   EXPECT_EQ(solid["rule"], "winding");
@@ -237,7 +239,7 @@ TEST_F(FileCommands, PlanOfASolid) {
   EXPECT_NE(text.out.find("voxels inside"), std::string::npos) << text.out;
 }
 
-// status reads a work folder. A folder that does not exist or has no job is an error.
+// status reports the state of the build in a work folder. If the folder does not exist, it fails.
 TEST_F(FileCommands, StatusNames) {
   run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag", "--keep-work"});
   const Json status = run_json({"status", "m.vdag.work"});
@@ -265,7 +267,8 @@ TEST_F(FileCommands, GenerateIsSeeded) {
   expect_error(2, "expected one of", {"generate", "cathedral", "g.glb"});
 }
 
-// The ending of the name selects PNG or JPEG. Own pictures are replaced without --force.
+// The ending of the output's name selects PNG or JPEG. An earlier picture of render is replaced
+// without --force; a truncated picture is not.
 TEST_F(FileCommands, RenderWritesJpeg) {
   const std::vector<std::string> render = {"render", "m.vdag", "-o", "m.JPG", "--size", "64x48"};
   run_json(render);
@@ -280,13 +283,14 @@ TEST_F(FileCommands, RenderWritesJpeg) {
   EXPECT_EQ(contents("t.png")[25], 6) << "expected RGBA";
 }
 
-// Names for other formats of pictures are refused.
+// render refuses output names with the endings of other picture formats.
 TEST_F(FileCommands, RefusesNamesOfOtherPictureFormats) {
   for (const char* name : {"p.WebP", "p.tiff", "p.exr"})
     expect_error(2, "ends in .png", {"render", "x.vdag", "-o", name});
 }
 
-// The numbers of all levels add up to the numbers of the file, in JSON and in CSV.
+// The sums of the levels' node counts and bytes equal the counts and bytes of the complete file, in
+// JSON and in CSV.
 TEST_F(FileCommands, InfoCountsTheOctreeAndTheChildren) {
   const Json json = run_json({"info", "m.vdag", "--stats"});
   uint64_t svo_nodes = 0, dag_nodes = 0, node_bytes = 0;

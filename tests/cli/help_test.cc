@@ -25,7 +25,8 @@ TEST_F(Help, ListsAllCommands) {
     EXPECT_NE(answer.out.find(std::string("\n  ") + command + " "), std::string::npos) << command;
 }
 
-// Every command has --help, which mentions --json, and works without any other option.
+// `voxdag COMMAND --help` succeeds for every command, without the command's required arguments. The
+// help text mentions --json.
 TEST_F(Help, OfEveryCommand) {
   for (const char* command : kCommands) {
     SCOPED_TRACE(command);
@@ -37,7 +38,8 @@ TEST_F(Help, OfEveryCommand) {
   }
 }
 
-// Checks that a help text has the options of the commands up to `scope`, and no others.
+// Checks for each field that the help text has its option exactly if the field's scope is at most
+// `scope` (kSubmit, kPlan or kBuild).
 struct OptionFinder {
   template <class T>
   void operator()(const voxdag::Field& field, T&) {
@@ -84,7 +86,8 @@ TEST_F(Help, Version) {
   for (const char* word : {"-V", "version"}) EXPECT_EQ(run({word}).out, answer.out) << word;
 }
 
-// Each optional part is listed, and a missing one with the packages that it needs.
+// The version lists every optional feature, whether this program has it or not, with the packages
+// that the feature needs.
 TEST_F(Help, VersionListsTheFeatures) {
   const std::string text = run({"--version", "--verbose"}).out;
   const Json json = run_json({"version"});

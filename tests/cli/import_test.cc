@@ -26,7 +26,7 @@ TEST_F(Import, MakesASceneThatCanBeBuilt) {
   EXPECT_EQ(report["warnings"], Json::array());
   EXPECT_FALSE(exists("a.glb.partial"));
   EXPECT_EQ(run({"build", "a.glb", "-r", "64", "-o", "a.vdag"}).status, 0);
-  // import overwrites a file only if an earlier import wrote it, unless --force is given.
+  // Without --force, import overwrites a file only if an earlier import wrote it.
   EXPECT_EQ(run({"import", "a.off", "a.glb"}).status, 0);
   put("other.glb", "something else");
   expect_error(2, "--force", {"import", "a.off", "other.glb"});

@@ -17,7 +17,8 @@ class Interrupt : public CommandLine {
   void SetUp() override {
     ASSERT_EQ(run({"generate", "soup", "s.glb", "--triangles", "3000"}).status, 0);
   }
-  // Runs the build until its first message plus wait_ms, then sends a signal.
+  // Starts the build. Sends the signal `wait_ms` milliseconds after the build has printed its first
+  // message, and waits for its end.
   Answer interrupt(int signal, int wait_ms) {
     put(".stderr", "");
     const pid_t pid = start(args_);
@@ -34,9 +35,9 @@ class Interrupt : public CommandLine {
                                           "s.vdag", "--threads", "1",  "--subvolume", "128"};
 };
 
-// SIGINT and SIGTERM stop a build with status 130, and the output file does not exist. The same
-// command then writes the bytes of an uninterrupted build. A build may finish before its signal
-// arrives, but at least one build must be interrupted.
+// A build that SIGINT or SIGTERM interrupts exits with status 130 and leaves no output file. The
+// same command then resumes it, and writes the bytes of an uninterrupted build. A build may finish
+// before its signal arrives, but at least one build must be interrupted.
 TEST_F(Interrupt, StopsAndResumes) {
   std::vector<std::string> clean = args_;
   clean[5] = "clean.vdag";
@@ -134,7 +135,7 @@ TEST_F(InterruptExport, LeavesNothing) {
         EXPECT_EQ(outputs(), 0u);
       } else {
         EXPECT_GT(outputs(), 0u);
-        // The same command must then succeed, and remove the files of the killed run.
+        // The same command must then succeed, and remove the temporary files of the killed run.
         const Answer again = run(args);
         EXPECT_EQ(again.status, 0) << again.err;
         EXPECT_EQ(outputs(), 1u);

@@ -35,8 +35,9 @@ TEST_F(Limits, FileSizesAreNoSpace) {
 }
 
 TEST_F(Limits, OpenFilesAreNamed) {
-  // With a lower limit, the program does not load; with a higher one, the build does not fail. The
-  // program may inherit open files. This test itself opens the program's answers.
+  // Raises the limit until the program starts but its build fails with an error that names the
+  // limit. The first limit allows the files that the program inherits, and one more, with which
+  // this test redirects the program's output.
   const int unused = open("/dev/null", O_RDONLY);
   close(unused);
   const auto first = static_cast<rlim_t>(unused) + 1;
@@ -49,8 +50,9 @@ TEST_F(Limits, OpenFilesAreNamed) {
   EXPECT_NE(answer.err.find("ulimit -n, is "), std::string::npos) << answer.err;
 }
 
-// Lowers the limit until the build fails, with an error that names the limit. Below that, the
-// libraries themselves do not start.
+// Lowers the limit until the build fails. Its error must name the limit. If the program needs more
+// address space to load its libraries than to build, it cannot report the limit, and the test is
+// skipped.
 TEST_F(Limits, AddressSpaceIsNamed) {
   if (VOXDAG_SANITIZED) GTEST_SKIP() << "sanitizers need the address space";
   Answer answer;

@@ -48,7 +48,7 @@ std::string stl_text() {
   return text + "endsolid pyramid\n";
 }
 
-// The header begins with "solid", like an ASCII file.
+// Returns a binary STL file whose header begins with "solid", as an ASCII file does.
 std::string stl_binary() {
   std::string file = "solid but binary";
   file.resize(80);
@@ -115,7 +115,7 @@ std::string withheld_las() {
   return las.file();
 }
 
-// The mesh has a weight for a morph target that does not exist.
+// Returns a scene whose mesh has a weight for a morph target that does not exist.
 std::string morphed_glb() {
   voxdag::test::SceneBuilder scene = voxdag::test::one_triangle();
   scene.root["meshes"][0]["weights"] = {1};
@@ -140,7 +140,8 @@ std::vector<Faulty> faulty_files() {
   };
 }
 
-// A warning has a code, a count and its first place. With --strict the build fails instead.
+// Each faulty file gives a warning with a code, the number of faults, and the place of the first
+// fault. With --strict the build fails instead.
 TEST_F(MeshFormats, ReportWarnings) {
   for (const Faulty& file : faulty_files()) {
     SCOPED_TRACE(file.name);

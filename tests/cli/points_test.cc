@@ -55,7 +55,8 @@ TEST_F(Points, EveryFormatGivesTheSameBytes) {
   }
 }
 
-// With --point-radius 5, the point becomes the surface of a cube with 11 voxels along each edge.
+// With --point-radius 5 and voxels of edge 1, a point becomes the surface of a cube with 11 voxels
+// along each edge: the point's voxel, and five voxels on each side.
 TEST_F(Points, RadiusMakesCubes) {
   put("a.xyz", "1 2 3\n");
   const Json one = run_json({"build", "a.xyz", "-r", "64", "--voxel-size", "1", "-o", "one.vdag"});

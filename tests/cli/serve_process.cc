@@ -30,7 +30,7 @@ ServeProcess::ServeProcess(const std::string& folder, const std::vector<std::str
   unlink(log_path_.c_str());  // removes the log of an earlier server
   pid_ = fork();
   if (pid_ == 0) {
-    prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that is killed leaves no server behind
+    prctl(PR_SET_PDEATHSIG, SIGKILL);  // if the test is killed, the server also ends
     const int log = open(log_path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0666);
     if (log < 0 || dup2(log, STDERR_FILENO) < 0 || dup2(log, STDOUT_FILENO) < 0) _exit(127);
     execv(VOXDAG_BINARY, argv.data());

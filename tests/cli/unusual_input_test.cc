@@ -1,4 +1,4 @@
-// Regression tests for defects that an attack on the program found.
+// Regression tests for defects that were found by giving the program hostile input.
 #include <sys/stat.h>
 
 #include <cstdlib>
@@ -15,8 +15,8 @@ class UnusualInput : public CommandLine {
  protected:
   void SetUp() override { make_scene(); }
   void build() { run_json({"build", "m.glb", "-r", "64", "-o", "m.vdag"}); }
-  // Runs a command that would overwrite `name`. Checks that it refuses and does not change the
-  // file.
+  // Runs a command that would overwrite the file `name`. Checks that the command fails and does not
+  // change the file.
   void expect_refused(const std::string& name, const std::vector<std::string>& args) {
     SCOPED_TRACE(name);
     const std::string before = contents(name);
@@ -25,8 +25,8 @@ class UnusualInput : public CommandLine {
   }
 };
 
-// Names with control characters do not reach the terminal, and cannot forge a line. In JSON they
-// are escaped.
+// Commands do not print the control characters of a file's name, which could control the terminal
+// or start a false line of output. In JSON these characters are escaped.
 TEST_F(UnusualInput, ControlCharactersOfNamesAreNotPrinted) {
   const std::string evil = "a\x1b[31m\nforged\xc2\x9b\xe2\x80\xae";
   ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", evil + ".vdag"}).status, 0);
@@ -51,8 +51,8 @@ TEST_F(UnusualInput, ControlCharactersOfNamesAreNotPrinted) {
 
 constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
 
-// A path is a sequence of bytes. In JSON, U+FFFD replaces bytes that are not UTF-8. The file itself
-// has the exact name.
+// A path may have bytes that are not UTF-8. The created file has exactly this name. In JSON, U+FFFD
+// replaces such bytes, because JSON must be UTF-8.
 TEST_F(UnusualInput, PathsNeedNotBeUtf8) {
   build();
   const auto expect_output = [&](std::vector<std::string> args, const std::string& suffix) {
@@ -99,8 +99,8 @@ TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
   const std::vector<std::string> generate = {"generate", "menger", "--level", "1"};
   for (std::vector<std::string> args : {render, generate}) {
     SCOPED_TRACE(args[0]);
-    // Not replaced: a text, the beginning of a picture or a scene that another program made, and a
-    // truncated file.
+    // These files are not replaced: a text, the beginnings of a picture and of a scene, which
+    // another program may have made, and a file of one byte.
     for (const char* bytes : {"mine", "\x89PNG\r\n\x1a\n", "glTF", "g"}) {
       put("mine", bytes);
       args.push_back("mine");
@@ -125,7 +125,8 @@ TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
   expect_refused("same.partial", {"render", "m.vdag", "-o", "same", "--force"});
 }
 
-// A build also refuses to overwrite other files that have the name of its partial file or report.
+// A build refuses to overwrite a file that it did not create, not only at its output, but also at
+// the paths of its partial file and its report.
 TEST_F(UnusualInput, ABuildRefusesToOverwriteItsNeighbors) {
   for (const char* name : {"q", "q.partial", "q.report.json", "q.report.json.partial"}) {
     put(name, "mine");
@@ -138,7 +139,8 @@ TEST_F(UnusualInput, ABuildRefusesToOverwriteItsNeighbors) {
   run_json({"build", "m.glb", "-r", "128", "-o", "q"});
 }
 
-// An input that is not a file, such as a folder, is invalid input for every command.
+// An input that is not a regular file, such as a folder or a pipe, is invalid input for every
+// command.
 TEST_F(UnusualInput, InputsThatAreNoFilesHaveOneStatus) {
   build();
   ASSERT_EQ(mkfifo(folder_.file("pipe").c_str(), 0600), 0);
@@ -155,7 +157,7 @@ TEST_F(UnusualInput, InputsThatAreNoFilesHaveOneStatus) {
     }
 }
 
-// A missing output folder is reported before the work begins.
+// If the folder of the output does not exist, the command fails before it begins its work.
 TEST_F(UnusualInput, AMissingOutputFolderIsNoticedFirst) {
   build();
   expect_error(3, "the folder none does not exist",
@@ -163,7 +165,8 @@ TEST_F(UnusualInput, AMissingOutputFolderIsNoticedFirst) {
   expect_error(3, "the folder none does not exist", {"render", "m.vdag", "-o", "none/x.png"});
 }
 
-// Numbers are read exactly, and an error is one line that names the expectation.
+// A text that is not exactly a number in the option's range is refused, and so is a mistyped
+// command or option. The error is one line that names the expected values.
 TEST_F(UnusualInput, NumbersAndMessages) {
   const std::vector<std::string> build = {"build", "m.glb", "-o", "m.vdag", "-r"};
   for (const char* number : {"-4", "abc", "64x", "", "99999999999999999999", "6.4"}) {
@@ -189,8 +192,9 @@ TEST_F(UnusualInput, NumbersAndMessages) {
   }
 }
 
-// Only a message of a command that has the option --force names this option. The scene is one
-// triangle, 1000 * (2^32 - 1) times at the same place, which no disk can hold.
+// `build` and `plan` refuse a scene for which the disk has no space. The message of `build` names
+// the option --force; the message of `plan`, which has no such option, does not. The scene has 1000
+// * (2^32 - 1) instances of one triangle.
 TEST_F(UnusualInput, OnlyBuildNamesForce) {
   Json nodes = Json::array(), roots = Json::array();
   for (int i = 0; i < 1000; ++i) {
@@ -220,7 +224,8 @@ TEST_F(UnusualInput, OnlyBuildNamesForce) {
   EXPECT_EQ(plan.err.find("--force"), std::string::npos) << plan.err;
 }
 
-// A plan spills to a writable folder, even if TMPDIR does not name one.
+// `plan` works even if TMPDIR does not name a writable folder, because it then spills triangles to
+// another folder.
 TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
   for (const char* folder : {"/proc/none", ""}) {
     SCOPED_TRACE(folder);
@@ -231,7 +236,7 @@ TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
   }
 }
 
-// If the standard output cannot be written, this is an error.
+// A command whose standard output cannot be written fails, and its error names the standard output.
 TEST_F(UnusualInput, OutputThatCannotBeWrittenIsAnError) {
   build();
   for (const char* command :
@@ -245,7 +250,8 @@ TEST_F(UnusualInput, OutputThatCannotBeWrittenIsAnError) {
   }
 }
 
-// An extension that a scene requires can be ignored, by each command that reads scenes.
+// By default, a scene that requires an unknown extension is refused. With an option, each command
+// that reads scenes ignores the extension.
 TEST_F(UnusualInput, RequiredExtensionsAreIgnoredOnRequest) {
   std::ofstream(folder_.file("t.gltf"))
       << R"({"asset":{"version":"2.0"},"extensionsRequired":["ACME_bent","ACME_twisted"],)"

@@ -16,7 +16,7 @@ class View : public CommandLine {
     make_scene();
     ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", "m.vdag"}).status, 0);
   }
-  // Waits until standard output has a line, and returns standard output.
+  // Waits until the command has printed a line, and returns its standard output.
   std::string first_line() {
     for (int i = 0; i < 3000 && contents(".stdout").find('\n') == std::string::npos; ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -40,8 +40,8 @@ TEST_F(View, ServesUntilItIsInterrupted) {
   }
 }
 
-// SIGINT arrives while the cameras of a larger file are still being computed. The command ends with
-// 0.
+// After the first line of output, `view` may still compute the cameras of a large file. SIGINT then
+// ends it with status 0.
 TEST_F(View, EndsWhileItStarts) {
   ASSERT_EQ(run({"build", "m.glb", "-r", "2048", "-o", "large.vdag"}).status, 0);
   put(".stdout", "");

@@ -1,4 +1,5 @@
-// glTF files whose buffers have unusual URIs, and files that are refused by name.
+// glTF files whose buffers have unusual URIs, and files that no command can build: the error names
+// the format of the file or the reason.
 #include "tests/cli/inputs/input.h"
 
 namespace input_files {

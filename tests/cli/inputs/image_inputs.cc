@@ -25,7 +25,7 @@ SceneBuilder textured(const std::string& uri) {
   return scene;
 }
 
-// The texture names the image only in this extension, not in `source`.
+// Returns the mesh with an image that its texture names only in this extension, not in `source`.
 std::string by_extension(const std::string& extension, const std::string& uri) {
   SceneBuilder scene = textured(uri);
   scene.root["textures"] = {{{"extensions", {{extension, {{"source", 0}}}}}}};
@@ -57,7 +57,8 @@ WorldTriangles rectangle(double width) {
   return {{a, b, c}, {a, c, d}};
 }
 
-// A rectangle of 16 x 12. The texels from x = 10 on are transparent and black.
+// Returns a rectangle of 16 x 12. The texels from x = 10 on are transparent, so only a rectangle of
+// 10 x 12 is visible.
 Input cut_out() {
   SceneBuilder scene;
   const int positions = scene.add_positions({0, 0, 0, 16, 0, 0, 16, 12, 0, 0, 12, 0});

@@ -23,16 +23,16 @@ struct Mesh {
   std::vector<std::array<float, 3>> vertices;
   std::vector<std::vector<uint32_t>> strips;
 
-  // Indices of the strips' triangles, one after the other.
+  // Returns the vertex indices of all triangles, strip after strip.
   std::vector<std::array<uint32_t, 3>> triangles() const;
-  // Coordinates of all vertices, one after the other.
+  // Returns x, y and z of all vertices, one vertex after the other.
   std::vector<float> coordinates() const;
   WorldTriangles world(const oracle::WorldPoint& translation = {0, 0, 0}) const;
 };
 const Mesh& band();
 
 using Color = std::array<int, 3>;
-// The colors of the files that have one.
+// The expected colors of the files that have a color.
 constexpr Color kRed{200, 60, 20}, kGreen{30, 160, 90};
 
 struct Input {
@@ -40,11 +40,11 @@ struct Input {
   std::string file;                               // the scene
   std::map<std::string, std::string> more_files;  // files that the scene refers to
   WorldTriangles triangles = band().world();      // the scene's triangles
-  // Triangles that set the expected voxels; nullopt if `triangles` do.
+  // The triangles whose voxels the build must set; nullopt if these are all `triangles`.
   std::optional<WorldTriangles> visible = {};
-  std::optional<Color> color = {};  // color of all cells; builds with --color
-  std::string warning = "";         // the code of the only warning
-  std::string error = "";           // part of the message; no voxels then
+  std::optional<Color> color = {};  // expected color of all cells; nullopt: built without --color
+  std::string warning = "";         // code of a warning that must occur once; "" for none
+  std::string error = "";           // part of the message if the build must fail; else ""
 };
 
 std::vector<Input> ply_text_inputs();

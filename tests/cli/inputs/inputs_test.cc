@@ -80,8 +80,8 @@ TEST_F(Inputs, Images) { check(image_inputs()); }
 TEST_F(Inputs, AreRefusedByName) { check(refused_inputs()); }
 
 #ifdef VOXDAG_HAS_DRACO
-// Decoding this mesh takes more than the smallest memory limit. Without --memory, verify has the
-// same memory as build.
+// Decoding this mesh takes more than 64 MiB, the lowest --memory. Without --memory, verify has the
+// same memory as build, which suffices.
 TEST_F(Inputs, LargeDracoMeshesAreVerified) {
   const auto data = voxdag::test::encode_draco(*voxdag::test::bumpy_grid(500, false),
                                                draco::MESH_EDGEBREAKER_ENCODING, 11, 10);

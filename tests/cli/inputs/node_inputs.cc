@@ -4,7 +4,8 @@
 namespace input_files {
 namespace {
 
-// The mesh is drawn by node 1, whose parent is node 0. The scene lists `roots`.
+// Returns a scene in which node 1 has the mesh and is the child of node 0. The scene's list of root
+// nodes is `roots`.
 std::string child(const Json& roots) {
   SceneBuilder scene = band_scene();
   scene.root["nodes"] = {{{"name", "parent"}, {"children", {1}}}, {{"mesh", 0}}};
@@ -12,7 +13,8 @@ std::string child(const Json& roots) {
   return scene.glb();
 }
 
-// A second node would change the bounds, but is hidden. With `by_parent`, it is in a hidden node.
+// Returns a scene with a second node that is hidden; if it were visible, it would change the
+// voxels. With `by_parent`, the node itself is visible, but its parent is hidden.
 std::string hidden(bool is_required, bool by_parent) {
   SceneBuilder scene = band_scene();
   Json node = {{"mesh", 0}, {"translation", {40, 0, 0}}};
@@ -32,7 +34,7 @@ std::string requiring(const std::string& extension) {
   return scene.glb();
 }
 
-// The strips are one primitive. The largest index begins a new strip.
+// Returns the mesh as one primitive with both strips. The index 65535, the largest, ends a strip.
 std::string restarts() {
   SceneBuilder scene;
   std::vector<uint16_t> indices;
@@ -69,7 +71,7 @@ std::string with_points_in_numbers() {
   return scene.glb();
 }
 
-// A chunk of an unknown type is between the JSON text and the buffer.
+// Returns a .glb file with a chunk of an unknown type between the JSON text and the buffer.
 std::string with_unknown_chunk() {
   using voxdag::test::little_endian;
   const std::string glb = band_scene().glb();

@@ -8,7 +8,8 @@ namespace {
 using voxdag::test::PlyFormat;
 using voxdag::test::PlyWriter;
 
-// With `with_lists`, each vertex has a list between its coordinates.
+// Returns the mesh as a little-endian PLY file. With `with_lists`, each vertex also has a list of 0
+// to 3 numbers between its coordinates x and y.
 std::string binary(const std::string& line_end, bool with_lists) {
   PlyWriter ply(PlyFormat::kLittle, line_end);
   ply.header("element vertex 12").header("property float x");
@@ -34,7 +35,8 @@ std::string binary(const std::string& line_end, bool with_lists) {
 
 using Points = std::vector<std::array<double, 2>>;
 
-// A polygon in the plane z = 0, and a triangle above it.
+// Returns a file with a polygon in the plane z = 0, and with a degenerate triangle above it.
+// `triangles` are the triangles into which the polygon must be divided, as indices of `corners`.
 Input polygon(const std::string& name, const Points& corners,
               const std::vector<std::array<size_t, 3>>& triangles) {
   Input input{name, "", {}, {}};

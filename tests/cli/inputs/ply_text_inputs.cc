@@ -48,7 +48,8 @@ std::string properties(const std::string& type, const std::vector<std::string>& 
   return lines;
 }
 
-// With `are_joined`, one row has all strips, with -1 between them.
+// Returns the mesh as a PLY file with triangle strips. With `are_joined`, all strips are in one
+// row, separated by the index -1.
 std::string strips(const Text& text, bool are_joined, bool with_faces = false) {
   std::string rows;
   size_t entries = 0, count = 0;
@@ -76,7 +77,8 @@ WorldTriangles twice(WorldTriangles triangles) {
   return triangles;
 }
 
-// Degenerate triangles: one for each vertex.
+// Returns a degenerate triangle for each vertex, because a point sets the same voxels as such a
+// triangle.
 WorldTriangles points() {
   WorldTriangles all;
   for (const auto& v : band().vertices) {

@@ -16,7 +16,8 @@ WorldTriangles joined(WorldTriangles a, const WorldTriangles& b) {
   return a;
 }
 
-// A joint moves the mesh by kByJoint. `weights` has four weights per vertex.
+// Returns the mesh with a skin whose only joint moves it by kByJoint. `weights` has four weights
+// per vertex, of the component type `type`.
 template <class T>
 SceneBuilder skinned(int type, const std::vector<T>& weights) {
   SceneBuilder scene = band_scene();
@@ -54,7 +55,8 @@ std::string with_unskinned_primitive() {
   return scene.glb();
 }
 
-// A morph target moves all vertices by (0 8 0), with weight 0.5.
+// Returns the mesh with a morph target that moves the first six vertices by (0, 8, 0). With the
+// weight 0.5, the result is morphed_band().
 SceneBuilder morphed(const Json& weights) {
   SceneBuilder scene = band_scene();
   std::vector<float> moves(3 * kVertices);
