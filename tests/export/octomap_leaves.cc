@@ -1,5 +1,6 @@
-// octomap_leaves FILE.bt: writes, for each leaf that OctoMap's own library finds, the x, y, z of
-// its low corner (as keys), its edge, and whether it is occupied, as 32-bit integers.
+// octomap_leaves FILE.bt: reads the file with OctoMap's own library. Writes for each leaf, as
+// 32-bit integers: the x, y, z keys (OctoMap's integer coordinates) of its low corner, its edge,
+// and whether it is occupied. Tests compare exports with this output.
 #include <octomap/OcTree.h>
 
 #include <cstdint>

@@ -11,7 +11,7 @@
 
 namespace voxdag::test {
 
-// Ends the program with an error: the file does not conform to its format.
+// Prints a message and ends the program: the file breaks the rules of its format.
 [[noreturn]] inline void fail(const std::string& message) {
   std::fprintf(stderr, "%s\n", message.c_str());
   std::exit(1);
@@ -22,7 +22,7 @@ inline void expect(bool right, const char* what) {
 
 class Digest {
  public:
-  // Adds a cell (face 0) or one of its six faces (1 to 6).
+  // Adds the cell (x, y, z) if `face` is 0, otherwise one of the cell's six faces (1 to 6).
   void add(int64_t x, int64_t y, int64_t z, uint64_t face = 0) {
     if ((x | y | z) >> 20 != 0) fail("a cell outside the grid");
     const uint64_t key = face << 60 | static_cast<uint64_t>(x) << 40 |

@@ -24,8 +24,9 @@ struct Grid {
   int levels;    // the grid has 2^levels voxels per edge
 
   int64_t resolution() const { return int64_t{1} << levels; }
-  // Returns the number of voxels between the grid's low corner and a world coordinate, minus
-  // `shift`. This number must be an integer.
+  // Converts the world coordinate `world` to a cell coordinate. `shift` is the position within a
+  // cell that the format stores: 0 for the low corner, 0.5 for the center. Ends the program if the
+  // result is not an integer.
   int64_t cell(int axis, double world, double shift) const {
     const double cell = (world - origin[static_cast<size_t>(axis)]) / voxel - shift;
     const double rounded = std::rint(cell);
@@ -84,7 +85,7 @@ void digest_voxel(const std::string& path, const Grid& grid, Digest& digest);
 void digest_vox(const std::string& path, const Grid& grid, Digest& digest);
 void digest_vdb(const std::string& path, const Grid& grid, Digest& digest);
 void digest_nvdb(const std::string& path, const Grid& grid, Digest& digest);
-// Adds the faces between voxels and empty cells.
+// Adds the faces between voxels and empty cells, because a glb file stores only these.
 void digest_glb(const std::string& path, const Grid& grid, Digest& digest);
 
 }  // namespace voxdag::test

@@ -1,4 +1,5 @@
-// Decodes glTF: adds the unit faces that each rectangle, stored as two triangles, covers.
+// Decodes glTF files, which store rectangles as two triangles each. Adds the faces of unit cells
+// that each rectangle covers.
 #include <nlohmann/json.hpp>
 
 #include "tests/export/whole/formats.h"

@@ -22,12 +22,12 @@ uint32_t set_below(uint32_t mask, uint32_t bit) {
   return static_cast<uint32_t>(std::popcount(mask & ((1u << bit) - 1)));
 }
 
-// Reads the 16 levels of OctoMap's octree depth first. An inner node has two bytes, two bits per
-// child: 1 is free, 2 is occupied, and 3 is an inner node.
+// Reads the 16 levels of OctoMap's octree in depth-first order. An inner node has two bytes, with
+// two bits per child: 0 is unknown, 1 is free, 2 is occupied, and 3 is an inner node.
 struct BtReader {
   const MappedFile& file;
   uint64_t at;
-  int64_t zero;  // the key of the grid's low corner
+  int64_t zero;  // OctoMap's key (integer coordinate) of the grid's low corner
   Digest& digest;
   uint64_t nodes = 1, known = 0;
 
@@ -49,7 +49,8 @@ struct BtReader {
       node(child_of(corner, child, kZFirst), depth + 1);
     }
   }
-  // `corner` is in units of `edge`.
+  // Adds all voxels of an occupied cube. `corner` is the cube's low corner, as a multiple of
+  // `edge`.
   void add_cube(const Corner& corner, int64_t edge) {
     for (int64_t i = 0; i < edge; ++i)
       for (int64_t j = 0; j < edge; ++j)
@@ -71,7 +72,7 @@ void add_brick(uint64_t mask, const Corner& corner, Digest& digest) {
   }
 }
 
-// A file of 32-bit words, which begin at the offset `words`.
+// An array of `count` 32-bit words in a file. It begins at the byte offset `words`.
 struct WordFile {
   const MappedFile& file;
   uint64_t words, count;

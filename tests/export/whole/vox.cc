@@ -13,8 +13,8 @@ struct VoxModel {
   uint32_t count = 0;
 };
 
-// A node of the scene. A transform has one child and a place, a group has children, and a shape has
-// a model.
+// A node of the scene graph. A transform node has one child and a place (its translation), a group
+// node has children, and a shape node has a model.
 struct VoxNode {
   std::array<int64_t, 3> place{};
   std::vector<int32_t> children;
@@ -98,9 +98,10 @@ class VoxScene {
     for (const int32_t child : node.children) visit(child, place);
     if (node.model >= 0) show(models_.at(static_cast<size_t>(node.model)), place);
   }
-  // Adds a model's voxels. The model's center, rounded down, is at its place. z is up, and the
-  // origin is the middle of the grid's floor. The file has the coordinates of a voxel's low corner;
-  // for voxdag's -z axis, this is the voxel's high corner along z.
+  // Adds a model's voxels. `place` is the position of the model's center, rounded down, relative to
+  // the middle of the grid's floor. The z axis of the file is voxdag's y axis, and its y axis is
+  // voxdag's -z axis. The file stores a voxel's low corner; because of the reversed axis, this
+  // corner is the high corner along voxdag's z axis.
   void show(const VoxModel& model, const std::array<int64_t, 3>& place) const {
     const int64_t middle = resolution_ / 2;
     for (uint64_t i = 0; i < model.count; ++i) {
