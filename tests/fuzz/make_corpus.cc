@@ -76,8 +76,9 @@ void add_text_scenes(const Corpus& corpus) {
   corpus.add("stl_file", "trailing_bytes", '\2' + header + little_endian(1) + facets);
 }
 
-// Adds the index of an artifact without the rest of the file. Adds frames with the five bytes that
-// the target artifact_frame expects before them.
+// Adds the index of an artifact without the rest of the file to the corpus of artifact_index. Adds
+// frames to the corpus of artifact_frame, each after the five bytes that this target expects (see
+// targets/artifact_frame.cc).
 void add_artifacts(const Corpus& corpus) {
   TemporaryFolder folder;
   constexpr uint32_t kGridLevels = 6, kHashBits = 64;
@@ -116,7 +117,8 @@ void add_artifacts(const Corpus& corpus) {
   }
 }
 
-// Adds the first bytes of the header, and all bytes between the header page and the checksum table.
+// Adds an input of the target global_file: the first `header_bytes` bytes of the header page, then
+// all bytes between this page and the checksum table. The target restores the rest.
 void add_global_file(const Corpus& corpus, const char* name, const std::string& path,
                      size_t header_bytes) {
   const std::string file = read_bytes(path);
@@ -127,7 +129,7 @@ void add_global_file(const Corpus& corpus, const char* name, const std::string& 
              file.substr(0, header_bytes) + file.substr(page, table_at - page));
 }
 
-// Adds files without attributes. An input has the used part of the header page and the levels.
+// Adds files without attributes. The header part of an input ends before the attribute table.
 void add_global_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {
@@ -146,7 +148,7 @@ void add_global_files(const Corpus& corpus) {
   }
 }
 
-// Adds files with attributes. The header's part of an input ends after the attribute table.
+// Adds files with attributes. The header part of an input ends after the attribute table.
 void add_colored_files(const Corpus& corpus) {
   TemporaryFolder folder;
   struct Input {
@@ -202,7 +204,7 @@ void add_records(const Corpus& corpus) {
   corpus.add("ingest_record", "one_file", without_checksum(encode(record)));
 }
 
-// Small images of every kind, and the first bytes of unsupported formats.
+// Adds small images of every format that voxdag reads, and the first bytes of unsupported formats.
 void add_images(const Corpus& corpus) {
   std::string pixels;
   for (size_t i = 0; i < size_t{16} * 12 * 8; ++i) pixels += static_cast<char>(i * i / 7 % 251);

@@ -1,6 +1,6 @@
-// Scenes with random changed bytes either work or end with an Error. They cause no crash, no
-// endless loop, and no allocation that the size of the file does not justify. Sanitizers and the
-// memory budget check this.
+// Reads scenes after random changes of their bytes. Each scene is read or refused with an Error.
+// Reading causes no crash, no endless loop, and no allocation that the size of the file does not
+// justify. Sanitizers and the memory budget check this.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +15,8 @@
 namespace voxdag::test {
 namespace {
 
-// A mutation may declare a huge number of instances. Scenes with more triangles are not read.
+// Limits the time of a test: scenes that declare more triangles are opened but not read. A mutation
+// may declare a huge number of instances.
 constexpr uint64_t kMaxTriangles = 200000;
 
 // Changes the file one to eight times: changes a byte to a random byte, to a digit or to another
@@ -44,15 +45,16 @@ std::string mutate(std::string file, std::mt19937& random) {
   return file;
 }
 
-// Counts the outcomes of mutations. If all files fail immediately, or all work, the test is of
-// little use.
+// Counts the results of reading mutated files. The tests require minimum counts, because a test in
+// which all files are refused immediately, or none, would check little.
 struct Outcomes {
   int worked = 0;
   int refused = 0;
   int with_image = 0;
 };
 
-// Reads the materials of the triangles. Returns the number of triangles with an image.
+// Prepares the images, and reads the surfaces of all triangles and some texels. Returns the number
+// of triangles with an image.
 int read_surfaces(OpenScene& open) {
   NoProgress progress;
   const auto textures = TextureSet::prepare(open.files, open.source->materials(), "scratch", 1,
@@ -70,7 +72,8 @@ int read_surfaces(OpenScene& open) {
   return with_image;
 }
 
-// Reads mutation `i` of a file.
+// Reads `file`, the mutation with the number `i`, and counts the outcome. For even `i`, invalid
+// triangles are skipped.
 void read(const std::string& file, int i, Outcomes& outcomes) {
   try {
     OpenScene open(file, {.skip_invalid = i % 2 == 0}, uint64_t{16} << 20);

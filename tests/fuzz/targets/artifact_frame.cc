@@ -1,5 +1,6 @@
-// The frames of an artifact. The first byte selects bricks or nodes and the hash bits. The next
-// four bytes are the numbers of rows and children, which are normally in the index.
+// Decodes a frame of an artifact. The first byte of the input selects bricks or nodes, and the
+// number of hash bits. The next four bytes give the numbers of rows and children, which an artifact
+// stores in its index. The rest is the frame.
 #include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
 #include "core/format/artifact/frame_codec.h"

@@ -1,5 +1,6 @@
-// The index of an artifact, with corrected checksum and position. A decoded index obeys the format,
-// so that encoding it gives the same bytes.
+// Decodes the index of an artifact. The target computes the checksum and the position of the index
+// from the input, so that a mutation reaches the code after these checks. The encoding of a decoded
+// index must have the same bytes as the input.
 #include "core/format/artifact/artifact_index.h"
 
 #include <algorithm>

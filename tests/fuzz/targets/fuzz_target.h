@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace voxdag::fuzz {
 
-// Ends the process with a message unless `holds`.
+// Aborts the process with a message unless `holds` is true.
 inline void require(bool holds, const char* property) {
   if (holds) return;
   std::fprintf(stderr, "fuzz target: this does not hold: %s\n", property);

@@ -1,7 +1,7 @@
-// Global files: the reader, lookups, colors, rays, tiles and the verifier. The input is the
-// beginning of the header page, then the bytes after this page. The beginning ends before the
-// attribute table if the header counts no attributes, and otherwise after it. Feature bits, sizes,
-// checksums and the checksum table are corrected, so that a mutation reaches the code behind them.
+// Reads global files: opening, lookups, colors, rays, tiles and verification. An input has the
+// first bytes of the header page, and then all bytes after this page. The first bytes include the
+// attribute table only if the header counts attributes. The target computes feature bits, sizes,
+// checksums and the checksum table, so that a mutation reaches the code after these checks.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -29,8 +29,9 @@ namespace {
 namespace layout = global_layout;
 constexpr uint64_t kMaxVisits = 4096;
 constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
-// Minimum words of a wide level, so that small files can have wide levels. Real files need many
-// more.
+// The verifier requires that a level is wide (64-bit pointers) if and only if it has more words
+// than this. The limit is low, so that small files can have wide levels. For real files it is
+// kNarrowLevelWords.
 constexpr uint64_t kNarrowWords = 2;
 
 void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
@@ -44,7 +45,8 @@ T get(std::span<const std::byte> bytes, size_t at) {
   return value;
 }
 
-// Feature bits of a file of version 2. A file without attributes has wide levels.
+// Returns feature bits that agree with the header of a file of version 2. A file without attributes
+// gets the bit of wide levels, because a file with neither would have version 1.
 uint64_t features_of(std::span<const std::byte> header, bool has_attributes) {
   if (!has_attributes) return layout::kWideLevels;
   for (size_t l = 0; l < layout::kMaxLevels; ++l)
@@ -80,7 +82,8 @@ std::vector<std::byte> make_file(std::span<const std::byte> input) {
   return file;
 }
 
-// A file in memory for a reader that opens paths. The file has no name in any folder.
+// A temporary file in memory, for a reader that opens a path. The file is in no folder; its path is
+// its descriptor in /proc.
 class NamelessFile {
  public:
   explicit NamelessFile(std::span<const std::byte> bytes) : fd_(memfd_create("fuzz", MFD_CLOEXEC)) {
@@ -96,7 +99,8 @@ class NamelessFile {
   const int fd_;
 };
 
-// Visits a part of the octree, and looks at the color and the other attributes of each cube there.
+// Visits at most kMaxVisits nodes of the octree, and reads the color and the other attributes of
+// each visited cube.
 struct BoundedVisitor {
   const voxdag_reader::File& file;
   uint64_t left = kMaxVisits;
@@ -165,8 +169,8 @@ void encode_tiles(const voxdag_reader::File& file) {
   }
 }
 
-// Sends queries with arbitrary words of the file as addresses. Even in a valid file, an address may
-// not have a node, so an error about corruption is allowed.
+// Requests tiles and color pages with arbitrary words of the file as addresses. An address may not
+// lead to a node, even in a valid file, so errors about corruption are allowed.
 void answer_strangers(const voxdag_reader::File& file) {
   const query::DagView view(file);
   const CheckedBlocks blocks(file);

@@ -1,5 +1,5 @@
-// Scene files: containers, JSON, the checks of a document, and the triangles of files that pass the
-// checks.
+// Reads glTF scenes, text or binary: the container, the JSON, the checks of the document, and the
+// triangles of files that pass the checks.
 #include "tests/fuzz/targets/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

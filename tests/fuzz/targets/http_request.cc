@@ -1,5 +1,5 @@
-// Bytes that a client sends to the service's port, through a real connection: the service answers
-// with HTTP or closes the connection, and continues to serve.
+// Sends the input to an HTTP server through a real connection. The server answers with HTTP or
+// closes the connection, and continues to accept connections.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kMaxWaits = 20;
 
-// Answers every request with its target and the readable part of its body.
+// Answers every request with its method, its path, and the part of its body that can be read.
 Response echo(Request& request) {
   std::string body = request.method + " " + request.target.path + "\n";
   if (request.read_body)
@@ -49,8 +49,8 @@ class EchoServer {
   std::thread thread_;
 };
 
-// Returns a different loopback address in each call: one address does not have enough ports for the
-// connections that were closed in the last minute.
+// Returns a different loopback address in each call. One address does not have enough ports,
+// because the port of a closed connection is unavailable for a minute.
 sockaddr_in next_loopback_address() {
   static uint32_t count = 0;
   sockaddr_in address{};
@@ -59,7 +59,8 @@ sockaddr_in next_loopback_address() {
   return address;
 }
 
-// Waits in steps of a second, so that it is not a finding if the machine pauses for longer.
+// Returns false after twenty polls of one second without data. Many short polls, because a pause of
+// the machine then uses up only one of them, and is not reported as a finding.
 bool has_something_to_read(int fd) {
   for (int i = 0; i < kMaxWaits; ++i) {
     pollfd waiting{fd, POLLIN, 0};
@@ -79,7 +80,7 @@ std::string exchange(int port, const uint8_t* data, size_t size) {
                 "the loopback has a free port");
   fuzz::require(::connect(fd, reinterpret_cast<sockaddr*>(&to), sizeof to) == 0,
                 "the service accepts connections");
-  // The service may refuse the rest of the bytes.
+  // The loop ends early if the server closes the connection before it has read all bytes.
   for (size_t sent = 0; sent < size;) {
     const ssize_t n = ::send(fd, data + sent, size - sent, MSG_NOSIGNAL);
     if (n <= 0) break;

@@ -1,6 +1,6 @@
-// Images: without changes, and PNG also with corrected checksums of its chunks, so that a mutation
-// reaches the code that follows. Any bytes give either pixels, which are the same each time, or an
-// error.
+// Decodes images. Any input gives either pixels or an error, and the same result again at the
+// second try. The input is also decoded with corrected PNG checksums, so that a mutation reaches
+// the code after the checksum tests.
 #include <zlib.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The record of an interrupted ingest in the job store, with a corrected checksum: a decoded
-// record can be encoded and decoded again.
+// Decodes the record of an interrupted ingest, which the job store keeps. The target corrects the
+// checksum. If a decoded record is encoded and decoded again, the result is the same.
 #include "scheduler/state/checkpoint/ingest_record.h"
 
 #include "core/base/error.h"

@@ -1,4 +1,5 @@
-// The body of POST /jobs: the text that is stored for a request parses to the same request.
+// Parses the body of POST /jobs. A parsed request has a normalized text, which the service stores.
+// Parsing this text must give the same request.
 #include "server/jobs/protocol/job_request.h"
 
 #include <string>
@@ -14,7 +15,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   } catch (const RequestError&) {
     return 0;
   }
-  // Outside of try: an error here is a finding.
+  // This call is outside of `try`, because an error here is a finding.
   voxdag::fuzz::require(parse_job_request(text).text == text,
                         "the stored text parses to the same request");
   return 0;

@@ -1,4 +1,5 @@
-// LAS files: the header and the records. Every input begins like a LAS file.
+// Reads LAS files: the header and the records. The target adds the signature of a LAS file before
+// every input.
 #include "tests/fuzz/targets/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,5 +1,5 @@
-// The durable state of a merge, with a corrected checksum. A decoded state is encoded to the same
-// bytes.
+// Decodes the state that an interrupted merge stores. The target corrects the checksum. The
+// encoding of a decoded state must have the same bytes as the input.
 #include "merge/checkpoint/merge_state.h"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// OBJ files and their libraries of materials. Every input is both: the statements of an OBJ file
-// after a few valid ones, and a library.
+// Reads OBJ files and their material libraries. The target uses every input twice: as the
+// statements of an OBJ file after a few valid statements, and as the library of this file.
 #include "tests/fuzz/targets/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

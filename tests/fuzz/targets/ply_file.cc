@@ -1,4 +1,5 @@
-// PLY files: the header, the rows, and the triangles. Every input begins like a PLY file.
+// Reads PLY files: the header, the rows, and the triangles. The target adds the first line of a PLY
+// file before every input.
 #include "tests/fuzz/targets/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {

@@ -1,5 +1,5 @@
-// Runs a fuzz target once on every file of the given files and folders, without a fuzzer. So the
-// corpus and past findings are regression tests with every compiler.
+// Runs a fuzz target, without a fuzzer, once on each of the given files and on each file in the
+// given folders. With it, the corpus and past findings are regression tests for every compiler.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>

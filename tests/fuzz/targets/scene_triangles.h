@@ -1,4 +1,4 @@
-// The checks of a file that the targets of scene formats share.
+// Checks that all fuzz targets for scene formats make of a file.
 #pragma once
 
 #include <string>
@@ -10,13 +10,13 @@
 
 namespace voxdag::fuzz {
 
-// Some bytes can declare any number of instances. Reading more triangles than this tests nothing
-// more.
+// Scenes that declare more triangles are not read: a few bytes can declare any number of instances,
+// and reading more of them reaches no new code.
 constexpr uint64_t kMaxTriangles = 2000;
 constexpr uint64_t kSceneBudgetBytes = uint64_t{16} << 20;
 
-// If the file is a scene, reads all its triangles, in one batch and one by one. `path` is the name
-// of the file. `files` has the other files to which the scene may refer.
+// Opens `file` as a scene with the name `path`. If it is valid, reads its triangles in one pass and
+// one by one, and their surfaces. `files` has the other files to which the scene may refer.
 inline void check_scene(std::string file, const std::string& path = "scene",
                         test::MemoryFiles files = {}) {
   files.contents[path] = std::move(file);

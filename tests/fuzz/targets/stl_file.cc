@@ -1,5 +1,6 @@
-// STL files. The first byte of an input selects the format: an ASCII file after its first lines, a
-// binary file whose size fits its number of facets, or the bytes as they are.
+// Reads STL files. The first byte of an input selects one of three forms of the rest: the
+// statements of an ASCII file after its first two lines, a binary file whose size and number of
+// facets are corrected to agree, or a file without changes.
 #include <algorithm>
 
 #include "tests/fuzz/targets/scene_triangles.h"

@@ -1,5 +1,5 @@
-// Text files with points: columns, lines and rows. The name of the file makes every text a file of
-// points.
+// Reads text files with points: columns, lines and rows. The target gives every input the name
+// scene.csv, so that it is read as points whatever its bytes are.
 #include "tests/fuzz/targets/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
