@@ -20,8 +20,8 @@ Triangles room_with_chair(int resolution, int64_t chair_x_voxels) {
   return scene;
 }
 
-// Only the chair is moved between two builds. The cache provides at least 95 % of the subvolumes. A
-// build without a cache gives the same file.
+// Between two builds only a chair moves. The cache provides at least 95 % of the second build's
+// subvolumes, and the file equals the file of a build without a cache.
 TEST_F(CacheTest, OneChairMoved) {
   constexpr int kResolution = 1024;
   auto before = spec_for(room_with_chair(kResolution, 100), kResolution);
@@ -65,8 +65,8 @@ TEST_F(CacheTest, ContentIsRelativeAndCanonical) {
   EXPECT_GT(report.subvolumes_cached, 0u);
 }
 
-// A subvolume is not found in the cache if the hash bits differ, if its entry is damaged, or if a
-// small limit has evicted the entry.
+// A build does not use the cache entry of a subvolume if the build has other hash bits, if the
+// entry is damaged, or if a small limit has evicted the entry.
 TEST_F(CacheTest, MissesWhatItMust) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 6, {{0, 0, 0}, 256}, 60);
   auto spec = spec_for(scene, 256);

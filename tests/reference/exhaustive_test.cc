@@ -1,4 +1,4 @@
-// Tests all cases of small grids.
+// Builds all cases, or a regular sample, of small scenes, and compares each file with the oracle's.
 #include "tests/reference/reference_build.h"
 
 namespace reference {
@@ -12,8 +12,8 @@ oracle::Triangle dot(int64_t x, int64_t y, int64_t z) {
   return {p, {p[0] + 20, p[1], p[2]}, {p[0], p[1] + 20, p[2] + 20}};
 }
 
-// In a grid of 4^3 voxels, the root is a brick. The file is right for each single voxel, alone or
-// with the first voxel.
+// In a grid of 4^3 voxels, the root is a brick. The file equals the oracle's for each single voxel,
+// and for each pair with the first voxel.
 TEST_F(Exhaustive, EveryVoxelOfABrick) {
   for (int v = 0; v < 64; ++v) {
     SCOPED_TRACE(v);
@@ -24,9 +24,9 @@ TEST_F(Exhaustive, EveryVoxelOfABrick) {
   }
 }
 
-// For many masks of octants, builds eight subvolumes with the same voxels in each octant of the
-// mask. So the root, a node of the top tree, has different masks over equal children. A merge that
-// ignored masks would move voxels to other octants.
+// For many masks of octants, builds a subvolume with the same voxels in each octant of the mask.
+// The root, a node of the top tree, then has this mask, and all its children are the same node. If
+// the merge ignored the mask, voxels would move to other octants.
 TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   for (int mask = 1; mask < 256; mask += mask < 32 ? 1 : 7) {
     SCOPED_TRACE(mask);
@@ -42,8 +42,8 @@ TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   }
 }
 
-// Two equal sub-DAGs are in different octants of different parents. They must keep their positions
-// when the two levels above them are merged.
+// Equal sub-DAGs occur in different octants of different parents. When the merge rewires the two
+// levels above them, each octant must keep its child.
 TEST_F(Exhaustive, EqualSubDagsOfDifferentParents) {
   for (int i = 0; i < 8; ++i)
     for (int j = i % 2; j < 8; j += 2) {

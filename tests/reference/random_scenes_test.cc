@@ -8,7 +8,7 @@ namespace {
 
 using RandomScenes = Reference;
 
-// Returns the kinds whose coordinates can be stored as floats exactly.
+// Returns the kinds of scenes whose coordinates floats can store exactly.
 std::vector<oracle::SceneKind> exact_kinds() {
   std::vector<oracle::SceneKind> kinds(std::begin(oracle::kAllKinds), std::end(oracle::kAllKinds));
   std::erase(kinds, oracle::SceneKind::kWide);
@@ -53,8 +53,9 @@ TEST_F(RandomScenes, GivenCubeInsideTheScene) {
   EXPECT_EQ(report.dropped_outside + report.triangles, all.size());
 }
 
-// Vertices are arbitrary floats, and the build computes the default cube. The oracle, which
-// computes the cube and snaps the vertices with its own code, gives the same DAG.
+// The scene has arbitrary floats as coordinates, and the build computes the default cube of the
+// grid. The oracle, which computes the cube and snaps the vertices with its own code, gives the
+// same DAG.
 TEST_F(RandomScenes, DefaultCube) {
   oracle::Random random(6);
   for (int round = 0; round < 12; ++round) {
@@ -86,7 +87,7 @@ TEST_F(RandomScenes, DefaultCube) {
   }
 }
 
-// Several files give the same scene as one file, however the triangles are divided.
+// A scene that is divided between two files gives the same bytes as the scene in one file.
 TEST_F(RandomScenes, SeveralFilesAreOneScene) {
   const Triangles scene = oracle::make_scene(oracle::SceneKind::kSoup, 7, {{0, 0, 0}, 64}, 30);
   const auto whole = expect_right(scene, 64, spec_for(scene, 64));

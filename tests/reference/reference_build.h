@@ -1,5 +1,5 @@
-// Runs complete builds in this process, from a .glb file to the global file, and reads the result
-// with voxdag_reader.h, the reader for engines.
+// Runs complete builds in the test's process, from a .glb file to the global file. Reads the result
+// with voxdag_reader.h, the reader that game engines use.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,8 +20,8 @@ namespace reference {
 
 constexpr uint64_t kMebibyte = uint64_t{1} << 20;
 
-// The arrays of a global file, with child indices instead of child offsets. Hashes are not in the
-// file.
+// The nodes of a global file, with child indices instead of the file's child offsets, so that they
+// can be compared with the oracle's. Hashes are not in the file.
 struct FileDag {
   std::vector<uint64_t> bricks;
   std::vector<std::vector<oracle::Node>> levels;  // from the bricks' parents up
@@ -38,20 +38,22 @@ std::string contents(const std::string& path);
 // Writes scenes to a temporary folder, and builds them there.
 class Reference : public testing::Test {
  protected:
-  // Returns the spec of a build of `scene`, which is in lattice units, in a grid of `resolution`
-  // voxels per edge. The spec gives the grid's cube, so that the build snaps every vertex to its
-  // present position. The scene file has `copies` copies of each triangle.
+  // Returns the spec of a build of `scene`, whose coordinates are in lattice units (256 per voxel),
+  // in a grid of `resolution` voxels per edge. The spec gives the grid's cube, so that the build
+  // snaps every vertex to exactly its lattice coordinates. The scene file has `copies` copies of
+  // each triangle.
   voxdag::BuildSpec spec_for(const Triangles& scene, int64_t resolution, int copies = 1);
-  // Builds with a unique output name.
+  // Builds to a new output file, whose path is in the report.
   voxdag::BuildReport run(voxdag::BuildSpec spec);
-  // Builds a scene in lattice units, and compares the file with the oracle.
+  // Builds `scene`, whose coordinates are in lattice units, and checks that the file equals the
+  // oracle's.
   voxdag::BuildReport expect_right(const Triangles& scene, int resolution, voxdag::BuildSpec spec);
 
   voxdag::TemporaryFolder folder_{fast_disk()};
 
  private:
-  // Hundreds of small builds spend their time waiting for the disk. Returns a folder on a disk in
-  // memory if one has enough free space.
+  // Returns a folder on a disk in memory if one has enough free space, because hundreds of small
+  // builds spend most of their time waiting for a real disk.
   static std::string fast_disk();
 
   int files_ = 0;

@@ -1,5 +1,5 @@
 // Run options, copies of triangles and the order of work do not affect the bytes of the file. The
-// reports show that the builds really spilled, split and merged in different ways.
+// tests check in the reports that the builds did spill, split and merge in different ways.
 #include <algorithm>
 
 #include "tests/reference/reference_build.h"
@@ -50,7 +50,8 @@ TEST_F(RunOptionsTest, NeverShow) {
   }
 }
 
-// The memory cannot hold all triangles, so they are spilled to disk. The bytes are the same.
+// Triangles that do not fit in memory are spilled to disk. The bytes are the same as without
+// spilling.
 TEST_F(RunOptionsTest, SpillingNeverShows) {
   Triangles scene = mixed_scene(128, 2);
   for (const auto& t : oracle::make_scene(oracle::SceneKind::kSubVoxel, 2, {{0, 0, 0}, 128}, 2000))
@@ -70,7 +71,7 @@ TEST_F(RunOptionsTest, SpillingNeverShows) {
 }
 
 // Subvolumes that exceed their share of the memory are split into their eight children. The bytes
-// are the same.
+// are the same as without splits.
 TEST_F(RunOptionsTest, SplittingNeverShows) {
   const Triangles scene =
       oracle::make_scene(oracle::SceneKind::kSpanning, 3, {{0, 0, 0}, 1024}, 400);

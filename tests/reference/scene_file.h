@@ -11,13 +11,13 @@ namespace reference {
 using oracle::Triangles;
 using oracle::WorldTriangle;
 
-// Returns the triangles in a world space where a voxel has edge 1. Exact for coordinates up to 2^24
-// lattice units.
+// Converts triangles from lattice units to a world space where a voxel has the edge 1. The result
+// is exact for coordinates up to 2^24 lattice units.
 std::vector<WorldTriangle> as_world(const Triangles& triangles);
 // Returns the triangles with their coordinates rounded to floats.
 std::vector<WorldTriangle> as_floats(std::vector<WorldTriangle> triangles);
 
-// Writes all triangles `copies` times, one copy after the other.
+// Writes a file with all triangles, `copies` times one after the other.
 void write_glb(const std::string& path, const std::vector<WorldTriangle>& triangles,
                int copies = 1);
 

@@ -1,4 +1,5 @@
-// Enclosed solids with a seed, compared with a flood of the oracle's shell.
+// Builds enclosed solids with a seed: only the empty space around this point becomes solid.
+// Compares them with a flood fill of the oracle's shell.
 #include <set>
 
 #include "core/base/error.h"
@@ -16,8 +17,8 @@ using voxdag::SolidName;
 
 using SeedVoxel = std::array<int, 3>;
 
-// Sets the empty voxels that walks reach from `start`. Returns false, and sets nothing, if a walk
-// leads to the border.
+// Sets the empty voxel `start` and all empty voxels that a path of empty face neighbors connects
+// with it. Returns false, and sets nothing, if a path leads out of the grid.
 bool fill_from(const SeedVoxel& start, oracle::Voxels& voxels) {
   std::vector<SeedVoxel> reached = {start};
   std::set<SeedVoxel> seen = {start};
@@ -37,7 +38,7 @@ bool fill_from(const SeedVoxel& start, oracle::Voxels& voxels) {
 
 class Seeds : public Reference {
  protected:
-  // The point is the center of the voxel.
+  // Returns the spec of an enclosed solid whose seed is the center of the voxel `seed`.
   BuildSpec seeded(const Triangles& scene, int resolution, const SeedVoxel& seed) {
     BuildSpec spec = spec_for(scene, resolution);
     spec.geometry.solid = SolidName::kEnclosed;
@@ -51,7 +52,8 @@ class Seeds : public Reference {
   }
 };
 
-// The places are in a cavity, between two shells, in a corner of the grid and in surfaces.
+// The seeds are in a cavity, between two shells, in a corner of the grid, and in voxels of the
+// surface, where they are refused.
 TEST_F(Seeds, EqualTheOracle) {
   for (const auto kind :
        {oracle::SolidKind::kNested, oracle::SolidKind::kTetrahedra, oracle::SolidKind::kDoubled,
@@ -81,7 +83,8 @@ TEST_F(Seeds, EqualTheOracle) {
     }
 }
 
-// The space of the seed is in one subvolume, or extends over many of them.
+// The space around the seed is inside one subvolume, or extends over many. The subvolume size, the
+// threads and the memory do not change the bytes.
 TEST_F(Seeds, RunOptionsNeverShow) {
   const Triangles scene = oracle::make_solid(oracle::SolidKind::kNested, 6, 256);
   const auto build = [&](const SeedVoxel& seed, uint64_t edge, unsigned threads) {

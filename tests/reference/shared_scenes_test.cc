@@ -1,5 +1,5 @@
-// Builds of real scenes. The expected counts come from independent code. Run options do not affect
-// the bytes.
+// Builds of real scenes. The expected counts of voxels and nodes were computed by independent code.
+// Run options do not affect the bytes.
 #include <filesystem>
 
 #include "core/format/global/diff.h"

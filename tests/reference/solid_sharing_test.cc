@@ -1,5 +1,5 @@
-// Builds of solids that divide or share their work: an enclosed part that exceeds the memory, and
-// the cache. The bytes are the same.
+// Builds of solids whose work is divided, because an enclosed part exceeds the memory, or shared,
+// through the cache. The bytes are the same as in other builds of the scene.
 #include <array>
 
 #include "tests/oracle/solid/solids.h"
@@ -47,8 +47,8 @@ class SolidSharing : public Reference {
   voxdag::CancelToken never_;
 };
 
-// The labels of the empty space of a subvolume exceed the memory, although the subvolume could be
-// built. So its octants are labeled and filled one by one.
+// A subvolume fits in memory while it is built, but the labels of its empty space, which find the
+// enclosed parts, do not fit. So its octants are labeled and filled one by one.
 TEST_F(SolidSharing, EnclosedPartsAreSplitIntoOctants) {
   Triangles scene = oracle::make_scene(oracle::SceneKind::kSpanning, 3, {{0, 0, 0}, 512}, 120);
   for (const auto& t : oracle::make_solid(oracle::SolidKind::kTorus, 1, 512)) scene.push_back(t);
@@ -64,8 +64,8 @@ TEST_F(SolidSharing, EnclosedPartsAreSplitIntoOctants) {
   EXPECT_EQ(split.solid->interior, whole.solid->interior);
 }
 
-// Solids by winding and parity neither read nor write the cache. An enclosed solid shares its shell
-// with other builds.
+// Builds of solids by winding and parity neither read nor write the cache. A build of an enclosed
+// solid shares its shell with other builds.
 TEST_F(SolidSharing, CacheNeverShows) {
   const BuildSpec shell = spec_for(oracle::make_solid(oracle::SolidKind::kNested, 3, 128), 128);
   const auto cached = [&](SolidName rule) {

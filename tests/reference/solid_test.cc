@@ -1,4 +1,5 @@
-// Whole builds of solids: equal to the oracle, and the same bytes for all run options.
+// Complete builds of solids have the voxels of the oracle's solids, and the same bytes for all run
+// options.
 #include <array>
 #include <filesystem>
 #include <utility>
@@ -33,7 +34,8 @@ void for_each_solid(Visit visit) {
 
 using SolidBuilds = Reference;
 
-// The build's bounds are the grid. Triangles outside it count as well.
+// Builds have the oracle's voxels and counts of the solid. The solid may extend beyond the grid;
+// the triangles outside also affect which voxels are inside.
 TEST_F(SolidBuilds, EqualTheOracle) {
   for_each_solid([&](oracle::SolidKind kind) {
     for (const int edge : {4, 8, 16, 32})
@@ -102,7 +104,8 @@ TEST_F(SolidBuilds, SplittingNeverShows) {
   EXPECT_EQ(split.solid->interior, whole.solid->interior);
 }
 
-// The stage that fills an enclosed solid reads the artifacts of any backend.
+// The stage that fills an enclosed solid works with the artifacts of another backend, and gives the
+// same bytes.
 TEST_F(SolidBuilds, EnclosedOnOtherBackends) {
   BuildSpec spec = spec_for(oracle::make_solid(oracle::SolidKind::kNested, 1, 256), 256);
   spec.geometry.solid = SolidName::kEnclosed;
@@ -130,7 +133,8 @@ Triangles cube_mesh(int64_t low, int64_t high) {
   return out;
 }
 
-// A solid of all voxels has one node per level.
+// If all voxels of the grid are set, the DAG has one node per level, because all nodes of a level
+// are equal.
 TEST_F(SolidBuilds, BoxFillsTheGrid) {
   BuildSpec spec = spec_for(cube_mesh(1, 512 * 256 - 1), 512);
   for (const SolidName rule : kSolids) {
@@ -142,8 +146,8 @@ TEST_F(SolidBuilds, BoxFillsTheGrid) {
   }
 }
 
-// All voxels of a large box are set. The empty cubes in its interior are subvolumes, larger cubes,
-// and cubes in subvolumes.
+// All voxels in a large box are set, although its interior has no triangles: cubes larger than a
+// subvolume, complete subvolumes, and cubes in subvolumes.
 TEST_F(SolidBuilds, CubesInABoxAreFull) {
   BuildSpec spec = spec_for(cube_mesh(256 * 100 + 1, 256 * 900 - 1), 1024);
   spec.geometry.solid = SolidName::kWinding;
@@ -151,7 +155,8 @@ TEST_F(SolidBuilds, CubesInABoxAreFull) {
   EXPECT_EQ(run(spec).merge.voxels, 800u * 800 * 800);
 }
 
-// The report has the warning for each defect of the surface.
+// Each defect of a surface gives its own warning in the report, if the rule of the solid is
+// affected by the defect.
 TEST_F(SolidBuilds, Warnings) {
   const auto code = [&](const Triangles& scene, SolidName rule) -> std::string {
     BuildSpec spec = spec_for(scene, 64);
@@ -179,7 +184,8 @@ TEST_F(SolidBuilds, Warnings) {
   EXPECT_EQ(code(doubled, SolidName::kWinding), "solid-canceled");
 }
 
-// The grid's first octant, at half the resolution, has the same voxels as a build of the octant.
+// A build of the grid's first octant as its own grid, with the same voxel size, has the same voxels
+// as the octant in the complete build.
 TEST_F(SolidBuilds, OctantEqualsTheGrid) {
   for (const auto kind : {oracle::SolidKind::kSphere, oracle::SolidKind::kHoles,
                           oracle::SolidKind::kTetrahedra, oracle::SolidKind::kOneInverted}) {
