@@ -1,4 +1,5 @@
-// The memory of the service while many clients do not read the largest answers.
+// Tests that the memory of the service remains bounded while many clients do not read the largest
+// answers.
 #include <fcntl.h>
 #include <signal.h>
 #include <sys/socket.h>
@@ -23,7 +24,7 @@ class AnswerMemory : public testing::Test {
  protected:
   void SetUp() override {
     std::ofstream(folder_.file("a.glb")) << "glTF";
-    // No job starts, because no disk has this much free space.
+    // No job starts, because no disk has the free space that this configuration requires.
     std::ofstream(folder_.file("config.json")) << Json{
         {"jobs", {{"min_free_disk", uint64_t{1} << 60}}}, {"scene_roots", {folder_.path()}}};
     const std::string log = folder_.file("log");
@@ -55,7 +56,8 @@ class AnswerMemory : public testing::Test {
     status >> size >> resident;
     return resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE));
   }
-  // Posts a job whose request is as large as possible.
+  // Posts a job with nearly the longest request that is allowed, so that answers about it are
+  // large.
   void post_large_job() {
     const std::string folder = folder_.path() + "/";
     std::string path = folder;
@@ -64,7 +66,7 @@ class AnswerMemory : public testing::Test {
     const ClientResponse answer = http_->send("POST", "/api/v1/jobs", body.dump(), {});
     ASSERT_EQ(answer.status, 202) << answer.body;
   }
-  // Requests `path` on a new connection and reads nothing.
+  // Requests `path` on a new connection, and does not read the answer.
   void ask_and_read_nothing(const std::string& path) {
     const int socket = raw_connect(std::stoi(url_.substr(url_.rfind(':') + 1)));
     const int small = 2048;

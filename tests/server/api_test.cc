@@ -39,7 +39,7 @@ class BytesOfText : public EncodedBytes {
   size_t at_ = 0;
 };
 
-// Counts the clearly red pixels of a PNG picture.
+// Returns the number of clearly red pixels in a PNG picture.
 uint64_t red_pixels(const std::string& png) {
   MemoryBudget budget(uint64_t{1} << 28);
   BytesOfText bytes(png);
@@ -133,7 +133,8 @@ TEST_F(Api, ServesRanges) {
   part = get({{"Range", "bytes=100-"}, {"If-Range", tag}});
   EXPECT_EQ(part.body, whole.body.substr(100));
   EXPECT_EQ(get({{"Range", "bytes=100-"}, {"If-Range", "\"other\""}}).status, 200);
-  // cpp-httplib 0.11 would read all further bytes of the connection as the body of the answer 304.
+  // With Connection: close, the server ends the connection after the answer. Otherwise cpp-httplib
+  // 0.11 would wait for a body, which an answer with status 304 does not have.
   EXPECT_EQ(get({{"If-None-Match", tag}, {"Connection", "close"}}).status, 304);
   part = get({{"Range", "bytes=0-3,8-11"}});
   EXPECT_EQ(part.status, 206);
@@ -242,8 +243,8 @@ TEST_F(Api, EstimatesAJob) {
             400);
 }
 
-// A stream begins with the job and reports every change until the job has ended. Last-Event-ID
-// resumes it.
+// The event stream of a job begins with the job's data and reports every change until the job ends.
+// A request with Last-Event-ID gets the events after this one.
 TEST_F(Api, StreamsEvents) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -313,7 +314,7 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   ASSERT_TRUE(until([&] {
     return http_->get("/metrics").body.find("voxdag_job_processes 0") != std::string::npos;
   }));
-  // If the build had no plan yet, it has removed its work folder.
+  // If the job was suspended before the build had a plan, the build has removed its work folder.
   std::filesystem::create_directories(work);
   for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(work + "/job.db" + suffix);
   write_file_atomically(system_files(), work + "/job.db", std::string(8192, 'x'));
@@ -347,7 +348,8 @@ TEST_F(Api, AcceptsScenesInsideItsRootsOnly) {
   EXPECT_EQ(status("/etc/passwd"), 404);
 }
 
-// The OpenAPI document, the pages and the messages list all file endings of the scene formats.
+// The OpenAPI document, the pages and the error messages list all file endings of the scene
+// formats.
 TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
   start();
   std::string suffixes = list_scene_endings("|", "|");
@@ -368,8 +370,8 @@ TEST_F(Api, ListsTheEndingsOfTheSceneFormats) {
   EXPECT_EQ(http_->get("/api/v1/scenes/PART.STL").status, 404);
 }
 
-// The OpenAPI document is generated from the routes. So it can only miss a status (RunningService
-// checks this) or differ from docs/api.md.
+// The OpenAPI document is generated from the routes, so it lists every route. It could only omit a
+// status, which RunningService checks, or differ from docs/api.md, which this test checks.
 TEST_F(Api, TheDocumentAndThePageListTheSameRequests) {
   start();
   const Json api = Json::parse(http_->get("/openapi.json").body);
@@ -377,7 +379,8 @@ TEST_F(Api, TheDocumentAndThePageListTheSameRequests) {
   const std::string page =
       read_small_file(system_files(), VOXDAG_SOURCE_DIR "/docs/api.md", uint64_t{1} << 20);
   for (const auto& [path, operations] : api.at("paths").items()) {
-    // docs/api.md does not list the routes for tiles of unfinished jobs one by one.
+    // docs/api.md does not have a line for each of the routes below /partial/, which serve the
+    // tiles of unfinished jobs.
     const bool is_partial = path.find("/partial/") != std::string::npos;
     for (const auto& [method, operation] : operations.items()) {
       std::string request = method + ' ' + path;
@@ -435,7 +438,8 @@ TEST_F(Api, LocksItsDataFolder) {
   EXPECT_THROW(Service(config_, system_files(), [](const std::string&) {}), Error);
 }
 
-// The log contains changes with the name of their author, but no reads.
+// The log reports each request that changes something, with the name of the client. It does not
+// report reads.
 TEST_F(Api, WritesAnAuditLog) {
   start();
   put_scene("m.glb", "x");

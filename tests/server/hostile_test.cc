@@ -50,7 +50,8 @@ TEST_F(Hostile, MalformedRequestsAreRejected) {
   EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
 }
 
-// The service does not parse an unread body as the next request.
+// The service refuses a request before it reads the body. It closes the connection, and does not
+// take the body for the next request.
 TEST_F(Hostile, AnUnreadBodyClosesTheConnection) {
   start();
   const std::string answer = raw_exchange(
@@ -61,7 +62,8 @@ TEST_F(Hostile, AnUnreadBodyClosesTheConnection) {
   EXPECT_NE(answer.find("Connection: close"), std::string::npos) << answer;
 }
 
-// A client, or a proxy, that looks for the answer only after it has sent the body gets the answer.
+// The service refuses an upload because of its header. The client, like some proxies, sends the
+// complete body before it reads the answer. It must get the answer, not a connection error.
 TEST_F(Hostile, ARefusalReachesAClientThatSendsAllFirst) {
   start();
   const std::string body(8 << 20, 'x');
@@ -94,7 +96,8 @@ TEST_F(Hostile, TooLargeBodiesAreRejected) {
             "");
 }
 
-// The stored part of a request has a limit, because every answer about the job contains it.
+// A job request that is too long is rejected, because the service stores most of it and every
+// answer about the job contains it.
 TEST_F(Hostile, LongRequestsAreRejected) {
   start();
   put_scene("a.glb", scene_bytes());
@@ -108,7 +111,7 @@ TEST_F(Hostile, LongRequestsAreRejected) {
   EXPECT_NE(answer.body.find("at most 32768"), std::string::npos) << answer.body;
 }
 
-// A chunked body without content is not a scene.
+// An upload with an empty chunked body is rejected, because it has no scene.
 TEST_F(Hostile, EmptyScenesAreRejected) {
   start();
   const std::string head = "PUT /api/v1/scenes/a.glb HTTP/1.1\r\nHost: localhost\r\n";
@@ -117,7 +120,8 @@ TEST_F(Hostile, EmptyScenesAreRejected) {
   EXPECT_EQ(http_->get("/api/v1/scenes/a.glb").status, 404);
 }
 
-// HEAD has the header fields of GET: an event stream has no length.
+// The answer to HEAD has the header fields of the answer to GET. For an event stream, neither has a
+// Content-Length.
 TEST_F(Hostile, HeadOfAStreamHasNoLength) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -130,8 +134,8 @@ TEST_F(Hostile, HeadOfAStreamHasNoLength) {
   EXPECT_EQ(answer.find("Content-Length"), std::string::npos) << answer;
 }
 
-// Control characters in a scene's texts reach neither answers nor logs, and a job's name cannot
-// have them.
+// Answers and logs do not contain the control characters of texts in scenes. A job's name with
+// control characters is rejected.
 TEST_F(Hostile, TextsOfScenesArePrintable) {
   start();
   const std::string uri = "%1b%5b31m%0aforged%3a%20done%c2%9b%e2%80%ae.bin";
@@ -200,7 +204,7 @@ TEST_F(Hostile, SlowClientsDoNotBlockOthers) {
   for (const int socket : slow) close(socket);
 }
 
-// If a header takes too long, the connection is closed.
+// The service closes a connection if the header of its request does not arrive in time.
 TEST_F(Hostile, HeadersTimeOut) {
   config_.http.limits.header_timeout_s = 0.2;
   start();

@@ -71,7 +71,8 @@ class HostileView : public testing::Test {
   std::string log_;
 };
 
-// Only requests for data of the damaged block are refused. The log mentions the damaged file once.
+// Requests for tiles in the damaged block are refused, and other tiles are sent. The log reports
+// the damage once. When the block is repaired, its tiles are sent again.
 TEST_F(HostileView, SeesThatAFileIsDamaged) {
   const auto file = open_global_file(path_);
   const uint32_t bricks = file->brick_level();
@@ -94,7 +95,7 @@ TEST_F(HostileView, SeesThatAFileIsDamaged) {
   EXPECT_TRUE(get(above + "/" + offset).body == whole);
 }
 
-// Only the pages of the damaged color region are refused.
+// Requests for color pages of the damaged region are refused, and all other pages are sent.
 TEST_F(HostileView, SeesThatColorsAreDamaged) {
   const uint64_t data = [&] {
     const auto file = open_global_file(path_);
@@ -106,7 +107,7 @@ TEST_F(HostileView, SeesThatColorsAreDamaged) {
     pages.push_back("colors?pages=6." + std::to_string(i >> 6) + '.' + std::to_string(i >> 3 & 7) +
                     '.' + std::to_string(i & 7));
   for (const std::string& page : pages) whole.push_back(get(page).body);
-  flip(data + 100000);  // color data of 240 KB; a block without levels of the DAG
+  flip(data + 100000);  // the color data is 240 KB long; this block has no levels
   size_t refused = 0;
   for (size_t i = 0; i < pages.size(); ++i) {
     const ClientResponse answer = get(pages[i]);
@@ -122,8 +123,8 @@ TEST_F(HostileView, SeesThatColorsAreDamaged) {
   EXPECT_EQ(lines_of_log(path_ + ": bytes "), 1u);
 }
 
-// A page of another site cannot send requests to an open viewer, but a link to its start page
-// works.
+// The viewer refuses requests that a page of another site sends. A link from another site to the
+// viewer's start page works.
 TEST_F(HostileView, RefusesRequestsOfOtherSites) {
   start();
   const auto status = [&](const std::string& path, const std::string& site) {
@@ -154,7 +155,8 @@ TEST_F(HostileView, SurvivesClientsThatLeave) {
   EXPECT_EQ(get("0/0").status, 200);
 }
 
-// Sends requests for tiles of a job, one after the other. Only one request may have a permit.
+// Requests tiles of a finished job, with a limit of one permit: only one request for tiles may be
+// in progress.
 class TilePermits : public RunningService {
  protected:
   void SetUp() override {
@@ -170,8 +172,8 @@ class TilePermits : public RunningService {
   std::string base_, version_;
 };
 
-// However a request ends, its permit becomes free for the next request, even if the client does not
-// read the answer.
+// A request returns its permit however it ends, even if the client does not read the answer. So the
+// next request can get it.
 TEST_F(TilePermits, AreFreeWhenTheWorkIsDone) {
   const std::string tile = base_ + "/0/0" + version_;
   const std::string tag = http_->get(tile).header("ETag");
@@ -182,15 +184,16 @@ TEST_F(TilePermits, AreFreeWhenTheWorkIsDone) {
               static_cast<ssize_t>(text.size()));
     return socket;
   };
-  // Some answers are "busy" first, because the permit of an answer may be held briefly after the
-  // answer.
+  // Repeats the request until it has the status, because a permit may be held for a moment after
+  // the answer was sent. Until then the answer is "busy".
   const auto ends_with = [&](const std::string& path, int status,
                              const client::HeaderMap& headers = {}) {
     return until([&] { return http_->get(path, headers).status == status; });
   };
   std::vector<int> sockets;
   for (int i = 0; i < 3; ++i) {
-    // cpp-httplib reads an answer without a length until the connection is closed.
+    // With Connection: close, the server ends the connection after the answer. Otherwise
+    // cpp-httplib would wait for a body, which an answer with status 304 does not have.
     EXPECT_TRUE(ends_with(tile, 304, {{"If-None-Match", tag}, {"Connection", "close"}}));
     EXPECT_TRUE(ends_with(base_ + "/0/1000000" + version_, 404));
     EXPECT_TRUE(ends_with(base_ + "/0/0?v=" + std::string(32, '0'), 410));

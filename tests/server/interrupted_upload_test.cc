@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint64_t kMiB = uint64_t{1} << 20;
 
-// A disk whose size the test sets, and on which only scenes take space. on_part_read is called at
-// each read of an unfinished upload.
+// A disk with a size of `bytes`, on which only scenes and unfinished uploads take space. Calls
+// on_part_read before each read of an unfinished upload.
 class TestDisk : public ForwardingFiles {
  public:
   TestDisk() : ForwardingFiles(system_files()) {}
@@ -76,7 +76,8 @@ class InterruptedUpload : public RunningService {
     }
     return socket;
   }
-  // Returns the answer to an upload whose body is not sent.
+  // Begins an upload, and sends only its header. Returns the first line of the answer up to the
+  // status.
   std::string answer_to_upload(const std::string& name, uint64_t size) {
     const int socket = begin_upload(name, size, "");
     char answer[13] = {};
@@ -99,8 +100,8 @@ class InterruptedUpload : public RunningService {
   TestDisk disk_;
 };
 
-// If a deletion fails halfway, the file that it marked is deleted later, but not the next scene
-// with the same name.
+// A deletion renames the scene's file to mark it, and then fails. The service deletes the marked
+// file later, but keeps a new scene with the same name.
 TEST_F(InterruptedUpload, SurvivesADeletionThatFailed) {
   start();
   const std::string path = "/api/v1/scenes/m.glb", bytes = scene_bytes();
@@ -118,8 +119,8 @@ TEST_F(InterruptedUpload, SurvivesADeletionThatFailed) {
   EXPECT_TRUE(std::filesystem::exists(data("scenes/files/m.glb")));
 }
 
-// Clients that announce uploads as large as the disk but send few bytes do not block other uploads
-// or jobs.
+// Clients that declare uploads as large as the disk but send few bytes do not block other uploads
+// or jobs, because their declared bytes are not reserved.
 TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   disk_.bytes = 200 * kMiB;
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
@@ -135,7 +136,8 @@ TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   for (const int socket : sockets) close(socket);
 }
 
-// An upload that starts over may use the space of the upload that it replaces.
+// An upload that starts over may use the space of the unfinished upload that it replaces, even if
+// both together do not fit on the disk.
 TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   disk_.bytes = 60 * kMiB;
   config_.jobs.min_free_disk_bytes = 8 * kMiB;
@@ -149,8 +151,8 @@ TEST_F(InterruptedUpload, StartsOverInItsOwnSpace) {
   EXPECT_EQ(http_->get("/api/v1/scenes/n.glb").status, 404);
 }
 
-// The service stops without reading a large scene to its end. The next service finishes the upload,
-// and the client need not send the bytes again.
+// All bytes of a scene have arrived, but the service stops while it computes their digest. The next
+// service finishes the upload, so the client need not send the bytes again.
 TEST_F(InterruptedUpload, IsFinishedByTheNextService) {
   const std::string bytes = scene_bytes();
   ASSERT_GT(bytes.size(), 512u << 10) << "the digest reads it in several pieces";
@@ -188,8 +190,9 @@ TEST_F(InterruptedUpload, IsRefusedByAServiceThatStops) {
   EXPECT_EQ(put_part("0123456789", 5, 10).status, 201);
 }
 
-// A job that is submitted while the last bytes arrive uses the old scene. The upload is finished
-// after this job has ended.
+// A job is submitted while the last bytes of a new version of its scene arrive. It uses the old
+// version, so the upload ends with a conflict. After the job has ended, an empty part finishes the
+// upload.
 TEST_F(InterruptedUpload, IsFinishedAfterAJobThatUsedTheScene) {
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
   start();
@@ -237,7 +240,7 @@ TEST_F(InterruptedUpload, IsNotAcknowledgedWithoutTheDatabase) {
   EXPECT_EQ(put_scene("m.glb", "x").status, 201);
 }
 
-// A clock that is far ahead for a while must not make uploads expire.
+// A clock that is far ahead for a while does not cause old uploads to be deleted.
 TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   const auto age = [&](const std::string& seconds) {
     SqlDatabase(data("scenes/scenes.db"), SqlDatabase::Mode::kReadWrite)
@@ -247,11 +250,12 @@ TEST_F(InterruptedUpload, OutlivesAClockThatJumped) {
   start();
   EXPECT_EQ(put_part("0123456789", 0, 5).status, 202);
   stop();
-  age("63072000");  // now the clock seems to be two years ahead
+  age("63072000");  // relative to the records, the clock is now two years ahead
   start();
   EXPECT_TRUE(until([&] { return log().find("no upload is deleted") != std::string::npos; }));
   EXPECT_EQ(offset("m.glb"), "5");
-  // The service has recorded a recent change, so the clock is right and the upload is really old.
+  // The new scene n.glb proves that the clock is right. So m.glb really is old, and the next start
+  // deletes it.
   EXPECT_EQ(put_scene("n.glb", "x").status, 201);
   stop();
   start();

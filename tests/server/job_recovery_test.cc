@@ -14,7 +14,7 @@ class JobRecovery : public RunningService {
  protected:
   ~JobRecovery() override {
     release();
-    stop();  // before the hook's data is destroyed
+    stop();  // before_step uses members of this class
   }
 
   std::string data(const std::string& name) { return config_.data_folder + "/" + name; }
@@ -38,8 +38,8 @@ class JobRecovery : public RunningService {
     return http_->send("DELETE", "/api/v1/jobs/" + id, "");
   }
 
-  // Makes the first step whose name starts with `beginning` wait until release(). With
-  // `when_armed`, only steps after arm() count.
+  // Blocks the first step of the service whose name starts with `beginning`, until release(). With
+  // `when_armed`, ignores steps before arm().
   void hold_step(const std::string& beginning, bool when_armed = false) {
     armed_ = !when_armed;
     config_.before_step = [this, beginning](const std::string& step) {
@@ -70,8 +70,8 @@ class JobRecovery : public RunningService {
   bool armed_ = true, held_ = false, free_ = false;
 };
 
-// If a deletion fails halfway, the rest is removed later. Until then the job cannot be retried,
-// because its new results would also be deleted.
+// If the deletion of a job fails halfway, the next service completes it. Until then the job cannot
+// be retried, because the deletion would also remove the new results.
 TEST_F(JobRecovery, AJobWhoseDeletionFailedIsNotTriedAgain) {
   start();
   const std::string id = posted_job();
@@ -108,8 +108,8 @@ TEST_F(JobRecovery, AResultWhoseDeletionFailedIsNotFound) {
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id).status, 404);
 }
 
-// At its start, the service deletes only the marked folder of a job. The job's new folder and its
-// record are kept.
+// At its start, the service deletes folders of jobs that an earlier deletion has marked. It keeps a
+// new folder and the record of the same job.
 TEST_F(JobRecovery, AMarkedFolderTakesNoOtherAlong) {
   start();
   const std::string id = posted_job(), waiting = posted_job();
@@ -191,7 +191,8 @@ TEST_F(JobRecovery, AListWithADamagedRequestIsJson) {
   }
 }
 
-// After the outcome of a run is recorded, the run does not affect later requests of clients.
+// While the thread of a suspended run still cleans up, the job can be canceled and deleted: the run
+// has recorded its outcome and does not change the job any more.
 TEST_F(JobRecovery, ASuspendedJobIsCanceledWhileItsThreadEnds) {
   use_program("exec sleep 600");
   hold_step("remove the work folder of job");
@@ -219,12 +220,13 @@ TEST_F(JobRecovery, AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   release();
 }
 
-// A stop request also works for a process that has not yet started the job's program, although the
-// process has inherited the service's signal handler.
+// A job is suspended after its process was requested but before it runs the job's program. In this
+// time the process has the service's handler of SIGTERM, so the signal alone would be lost.
+// Nevertheless the job stops.
 TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   use_program(R"(sleep 1; echo '{"json":"{}","message":"result"}')");
   hold_step("run ");
-  const auto before = std::signal(SIGTERM, [](int) {});  // as `voxdag serve` has one
+  const auto before = std::signal(SIGTERM, [](int) {});  // as `voxdag serve` does
   start();
   const std::string id = posted_job();
   until_held();
@@ -236,8 +238,8 @@ TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   std::signal(SIGTERM, before);
 }
 
-// A job that started after all other jobs were stopped would run to its end, and the service would
-// wait for it. So a stopping service starts no job.
+// A stopping service starts no more jobs. It would have to wait for the end of such a job, because
+// it has already stopped all jobs.
 TEST_F(JobRecovery, AServiceThatStopsStartsNoOtherJob) {
   use_program("exec sleep 10");
   config_.jobs.max_concurrent = 2;

@@ -61,7 +61,8 @@ class KilledService : public testing::Test {
       usleep(2000);
     }
   }
-  // Sends this signal to the service. Returns its exit status, or minus the number of the signal.
+  // Sends the signal to the service and waits for its end. Returns its exit status, or the negative
+  // number of the signal that killed it.
   int end(int signal) {
     if (pid_ <= 0) return 0;
     kill(pid_, signal);
@@ -127,7 +128,7 @@ TEST_F(KilledService, FinishesEveryJob) {
     usleep(static_cast<useconds_t>(pause_us(random)));
     ASSERT_EQ(end(SIGKILL), -SIGKILL);
     start();
-    if (state(jobs_.back().id) == "succeeded") post_jobs();  // each round must interrupt a job
+    if (state(jobs_.back().id) == "succeeded") post_jobs();  // each round must interrupt one
   }
   std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {
@@ -166,7 +167,8 @@ TEST_F(KilledService, DrainsAndResumes) {
   EXPECT_EQ(end(SIGTERM), 0);
 }
 
-// Idle clients do not use up the files that the service may open.
+// A service that may open few files limits its connections, so that idle clients leave files for
+// other clients and for jobs.
 TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   max_files_ = 64;
   prepare();
@@ -194,7 +196,8 @@ TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   for (const int socket : slow) close(socket);
 }
 
-// Other users of the machine cannot read the data folder, whatever the umask of the service is.
+// Files in the data folder are accessible only to the service's user, whatever the umask of the
+// service is.
 TEST_F(KilledService, DataIsForTheServiceAlone) {
   prepare();
   const ClientResponse posted =

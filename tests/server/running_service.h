@@ -1,4 +1,4 @@
-// Runs the service in the test's process on a free port. Jobs run in separate processes.
+// Runs the service in the process of the test, on a free port. Jobs run in separate processes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,7 +24,8 @@ using client::HttpClient;
 class RunningService : public testing::Test {
  protected:
   RunningService();
-  // Expects that all answers of the service had documented statuses.
+  // Expects that each answer of the service had a status that the OpenAPI document lists for its
+  // route.
   ~RunningService() override;
 
   void start();
@@ -53,7 +54,7 @@ class RunningService : public testing::Test {
   TemporaryFolder folder_;
   ServerConfig config_;
   FileSystem* files_ = &system_files();
-  bool injects_statuses_ = false;  // a test throws errors that no handler throws
+  bool injects_statuses_ = false;  // true: errors are injected, so any status is valid
   std::unique_ptr<HttpClient> http_;
 
  private:

@@ -36,8 +36,8 @@ class ServiceFailures : public RunningService {
   }
 };
 
-// Every step of the service and every handler throws at its first call, with exceptions of
-// different types. The service does not end.
+// Each step of the service and each handler throws when it first runs, with exceptions of different
+// types. The service continues to run and completes the job.
 TEST_F(ServiceFailures, NoFailureEndsTheService) {
   std::mutex mutex;
   std::set<std::string> failed;
@@ -89,7 +89,8 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
     EXPECT_TRUE(failed.contains(step)) << step;
 }
 
-// Steps that always fail, as on a broken disk, prevent only the work that depends on them.
+// All steps fail repeatedly, as on a broken disk. Requests are still answered, and the job waits in
+// the queue. When the steps work again, the job runs.
 TEST_F(ServiceFailures, StepsMayFailForEver) {
   std::atomic<bool> fails{true};
   config_.before_step = [&](const std::string& step) {
@@ -105,8 +106,8 @@ TEST_F(ServiceFailures, StepsMayFailForEver) {
   EXPECT_NE(log().find("failed to dispatch jobs: injected"), std::string::npos) << log();
 }
 
-// A client deletes a job while the retention rule removes it. This is no error, and the job is
-// removed.
+// A client deletes a job after the retention rule has selected it for removal. This causes no
+// error.
 TEST_F(ServiceFailures, RetentionMeetsADeletion) {
   config_.retention.finished_jobs = 0;
   std::atomic<bool> deleted = false;
@@ -143,7 +144,8 @@ TEST_F(ServiceFailures, AJobThatCannotBeReadFails) {
   EXPECT_EQ(Json::parse(http_->get("/api/v1/jobs").body)["jobs"].size(), 2u);
 }
 
-// If the queue is lost, no file is removed, and nothing starts until the operator adopts the jobs.
+// If the queue's database is missing or empty, the service does not start, and removes no file.
+// With --adopt, it starts and recreates the records of the jobs from their files.
 TEST_F(ServiceFailures, ALostQueueCostsNothing) {
   start();
   const std::string id = finished_job();
@@ -175,7 +177,8 @@ TEST_F(ServiceFailures, ALostQueueCostsNothing) {
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id + "/dag").body, dag);
 }
 
-// A job without a result is adopted as suspended, and continues at its checkpoint.
+// If the queue is lost, a job without a result is adopted as suspended. When it is resumed, it
+// succeeds.
 TEST_F(ServiceFailures, AnUnfinishedJobIsAdopted) {
   start();
   const std::string id = finished_job();
@@ -191,7 +194,7 @@ TEST_F(ServiceFailures, AnUnfinishedJobIsAdopted) {
   EXPECT_TRUE(until_state(id, "succeeded"));
 }
 
-// At its start, the service removes only files that it has marked itself.
+// At its start, the service removes only files that it marked when it began to delete them.
 TEST_F(ServiceFailures, ForeignFilesAreLeftAlone) {
   start();
   const std::string intact = finished_job(), deleted = finished_job();
@@ -229,8 +232,7 @@ TEST_F(ServiceFailures, DeleteDuringUploadIsRefused) {
         std::to_string(bytes.size()) + "\r\n\r\n" + bytes.substr(0, 1000);
     ASSERT_EQ(send(socket, head.data(), head.size(), MSG_NOSIGNAL),
               static_cast<ssize_t>(head.size()));
-    // Deleting an upload is allowed until its first bytes arrive, so the test waits for the
-    // upload's record.
+    // Waits until the upload is recorded, because before that the upload can be deleted.
     ASSERT_TRUE(
         until([&] { return http_->head("/api/v1/scenes/m.glb").header("Upload-Offset") == "0"; }));
     EXPECT_EQ(not_problem(http_->send("DELETE", "/api/v1/scenes/m.glb", ""), 409, "conflict"), "");
@@ -272,7 +274,7 @@ TEST_F(ServiceFailures, AnUploadWhosePartIsLostStartsOver) {
   EXPECT_EQ(part(0, bytes.size()).status, 201);
 }
 
-// One client cannot take all permits, so other clients are served.
+// One client cannot take all permits for transfers, so other clients are served.
 TEST_F(ServiceFailures, LimitsOfOneClient) {
   config_.transfers.max_per_client = 1;
   start();
@@ -316,7 +318,8 @@ TEST_F(ServiceFailures, APlanEndsWithItsClient) {
   EXPECT_EQ(log().find("failed to"), std::string::npos) << log();
 }
 
-// A deeply nested JSON value is refused, and does not end the service.
+// A deeply nested JSON value in a request is refused. It does not end the service by a stack
+// overflow.
 TEST_F(ServiceFailures, ADeepValueIsNoPriority) {
   config_.transfers.max_body_bytes = 64 << 20;
   start();
@@ -354,12 +357,12 @@ TEST_F(ServiceFailures, ReadyzNoticesThatTheQueueIsGone) {
   }
 }
 
-// A clock that is far ahead for a while must not make results expire.
+// A clock that is far ahead for a while does not cause results to be deleted.
 TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   start();
   const std::string id = finished_job();
   stop();
-  // Changes the times in the queue, so that the clock now seems to be two years ahead.
+  // Makes all times in the queue two years older, so that the clock seems to be two years ahead.
   edit_queue(
       "UPDATE job SET finished_s = finished_s - 63072000; "
       "UPDATE job_event SET at_s = at_s - 63072000");
@@ -368,13 +371,14 @@ TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   usleep(200'000);
   EXPECT_EQ(job(id)["state"], "succeeded");
   stop();
-  // Now the queue has a recent event, so the clock is right and the job is really old.
+  // A recent event proves that the clock is right. So the job really is old, and is removed.
   edit_queue("UPDATE job_event SET at_s = at_s + 63072000");
   start();
   EXPECT_TRUE(until([&] { return http_->get("/api/v1/jobs/" + id).status == 404; }));
 }
 
-// With tokens, plain HTTP on the network gives a warning, because tokens can be read there.
+// If the service with tokens listens on the network without TLS, it logs a warning, because others
+// can read the tokens.
 TEST_F(ServiceFailures, WarnsOfTokensInPlainText) {
   const NewToken admin = make_token("admin", "a");
   write_file_atomically(system_files(), folder_.file("tokens"), admin.line + "\n");

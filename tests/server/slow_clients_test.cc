@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kMaxConnections = 40;
 constexpr size_t kAttackers = 64;
 constexpr useconds_t kAttackBeginsUs =
-    1'500'000;  // by then, the service has waited for all attackers for over a second
+    1'500'000;  // the service may close connections after a second
 
 class SlowClients : public RunningService {
  protected:
@@ -24,7 +24,7 @@ class SlowClients : public RunningService {
   }
 
   int port() const { return std::stoi(url().substr(url().rfind(':') + 1)); }
-  // Opens a connection and sends these bytes, as far as the service accepts them without waiting.
+  // Opens a connection and sends as much of `bytes` as the kernel accepts without waiting.
   int open_with(const std::string& bytes) {
     sockets_.push_back(raw_connect(port()));
     send(sockets_.back(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
@@ -49,7 +49,8 @@ class SlowClients : public RunningService {
     }
     return total;
   }
-  // Returns the number of bytes that the kernel holds for clients of the service.
+  // Returns the number of bytes in the kernel's send queues of the service's connections, which
+  // clients have not read.
   size_t queued_bytes() {
     std::ifstream table("/proc/net/tcp");
     std::string line;
@@ -69,7 +70,8 @@ class SlowClients : public RunningService {
   std::vector<int> sockets_;
 };
 
-// Connections that send `begin` and then `piece` again and again. A closed one is opened again.
+// Keeps kAttackers connections open. Each sends `begin` and then `piece` repeatedly. A connection
+// that the service closes is replaced by a new one.
 class EndlessRequests {
  public:
   EndlessRequests(int port, std::string begin, std::string piece)
@@ -98,7 +100,8 @@ class EndlessRequests {
   std::jthread thread_;
 };
 
-// The line before a chunk has a limit. So do its extension, and the fields after the last chunk.
+// The service limits the length of the line before a chunk, of the chunk's extension, and of the
+// trailer fields after the last chunk.
 TEST_F(SlowClients, LinesOfChunksAreBounded) {
   start();
   const std::string head =
@@ -123,8 +126,8 @@ TEST_F(SlowClients, SlowBodiesDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// Clients that keep sending a request that has no end do not block others: neither with trailers,
-// which are limited, nor with a JSON body of tiny chunks, which has a deadline.
+// Endless requests do not block other clients. Trailer fields and empty lines before a request have
+// a limit of bytes, and a JSON body of tiny chunks has a deadline.
 TEST_F(SlowClients, BodiesWithoutEndDoNotBlockOthers) {
   start();
   const std::string head =
@@ -146,8 +149,8 @@ TEST_F(SlowClients, BodiesWithoutEndDoNotBlockOthers) {
   }
 }
 
-// Connections whose answers are not read are closed when other clients want to connect. The kernel
-// buffers only little of each answer.
+// The service closes connections whose answers are not read when other clients want to connect. The
+// kernel's queues hold at most 300 KiB of the answers of each connection.
 TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   start();
   std::string requests;
@@ -161,8 +164,8 @@ TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   EXPECT_EQ(answered(), 20);
 }
 
-// If a blank before a colon hid the length of a body, the service would read the rest of the body
-// as a request.
+// A header field with a blank before its colon is rejected. If the service ignored the field
+// Transfer-Encoding because of the blank, it would take the body for the next request.
 TEST_F(SlowClients, ABlankBeforeTheColonIsRejected) {
   start();
   const std::string answer = raw_exchange(
@@ -180,8 +183,7 @@ TEST_F(SlowClients, TwoHostsAreRejected) {
           .starts_with("HTTP/1.1 400 "));
 }
 
-// Several clients request /readyz concurrently. All of them get the answer that the service is
-// ready.
+// Several clients that request /readyz concurrently all get the answer that the service is ready.
 TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
   config_.transfers.max_requests_per_s = 0;
   start();
@@ -199,7 +201,7 @@ TEST_F(SlowClients, ReadinessDoesNotDependOnWhoElseAsks) {
   }
 }
 
-// Malformed requests, which are refused before they reach a route, are also counted.
+// The metrics also count malformed requests, which are refused before they reach a route.
 TEST_F(SlowClients, MalformedRequestsAreCounted) {
   start();
   raw_exchange(port(), "hello\r\n\r\n");

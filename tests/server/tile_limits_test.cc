@@ -18,7 +18,8 @@
 namespace voxdag::server {
 namespace {
 
-// Returns the size of a tile with this number of levels and the maximum contents (docs/format.md).
+// Returns the maximum size in bytes of a tile with this number of levels: all eight children exist
+// at every node (docs/format.md).
 uint64_t bytes_of_fullest_tile(uint32_t levels) {
   uint64_t nodes = 0, of_level = 1;
   for (uint32_t l = 0; l < levels; ++l, of_level *= 8) nodes += of_level;
@@ -32,8 +33,8 @@ std::string largest_batch(const std::string& version) {
   return path;
 }
 
-// Makes a scene in which all cubes of level 3 have voxels and no two are equal. So the tile of its
-// root is as large as possible.
+// Writes a scene whose root tile is as large as possible: all cubes of level 3 have voxels, and no
+// two of them are equal.
 void make_soup(const std::string& path) {
   const std::string command = std::string(VOXDAG_BINARY) + " generate soup " + path +
                               " --triangles 200000 --force >/dev/null 2>&1";
@@ -68,13 +69,14 @@ class TileLimits : public RunningService {
     HttpClient client(ClientOptions{url(), tokens_[name], "", 300});
     return client.get(base_ + path);
   }
-  // Requests the largest answer and reads only its beginning, so that the request holds a permit.
-  // Returns the socket.
+  // Requests the largest batch and reads only the first bytes of its answer, so that the request
+  // continues to hold a permit. Returns the socket.
   int ask_and_read_nothing(const std::string& name) {
     const std::string text = "GET " + base_ + largest_batch(version_) +
                              " HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n" +
                              "Authorization: Bearer " + tokens_[name] + "\r\n\r\n";
-    // The permit of the last answer may be held for a moment after the answer.
+    // Repeats the request while it is refused, because an earlier request may hold its permit for a
+    // moment after its answer.
     for (;;) {
       const int socket = raw_connect(std::stoi(url().substr(url().rfind(':') + 1)));
       EXPECT_EQ(send(socket, text.data(), text.size(), MSG_NOSIGNAL),
@@ -132,7 +134,7 @@ TEST_F(TileLimits, ASlowReaderGetsItsAnswer) {
   EXPECT_TRUE(answer.substr(answer.find("\r\n\r\n") + 4) == whole);
 }
 
-// A tile with the maximum contents has exactly the documented size.
+// A root tile with all eight children at every node has exactly the maximum size of docs/format.md.
 TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
   const Json manifest = Json::parse(get("anna", "").body);
   const uint32_t levels = manifest["tile_levels"];
@@ -150,7 +152,8 @@ TEST_F(TileLimits, TilesAreNoLargerThanDocumented) {
     EXPECT_LE(query::encode_tile(dag, depth, {0, 0}).size() * 4, bytes_of_fullest_tile(depth));
 }
 
-// Changes the file of `voxdag view` after each check of its identity by the service.
+// While `changes` is true, changes the file of `voxdag view` each time the service reads its
+// identity (its times and size).
 class ChangingFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;
@@ -167,7 +170,8 @@ class ChangingFiles : public ForwardingFiles {
         : ForwardingReader(std::move(file)), changes_(changes) {}
     FileIdentity identity() const override {
       const FileIdentity before = ForwardingReader::identity();
-      // Changes the file's time, as a write does. The loop is needed because times may be coarse.
+      // Changes the file's modification time, as a write does. Repeats this until the time differs,
+      // because times may be coarse.
       while (changes_ && system_files().open_read(path())->identity() == before)
         system_files().touch(path());
       return before;
@@ -178,8 +182,9 @@ class ChangingFiles : public ForwardingFiles {
   };
 };
 
-// While the file is being written, tiles may mix old and new contents. So the service does not send
-// them, and no browser stores them. After the writing ends, requests are answered again.
+// While another program writes the file, tiles could mix old and new contents. So the service
+// answers with the error `gone`, which no browser may store. After the last write, requests succeed
+// again.
 TEST(OverwrittenFile, IsGoneWhileItsTilesAreMade) {
   const TemporaryFolder folder;
   const std::string path = folder.file("m.vdag"), scene = folder.file("m.glb");

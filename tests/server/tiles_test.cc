@@ -93,8 +93,8 @@ TEST_F(Tiles, HaveAManifest) {
   EXPECT_EQ(http_->get(base_).header("Cache-Control"), "no-store");
 }
 
-// The contents of a URL with a digest never change. A client that has them is not sent them again:
-// it gets the status 304.
+// The contents of a URL with a digest never change. If a client already has them, it gets the
+// status 304 without the contents.
 TEST_F(Tiles, AreSentOnce) {
   finish_job();
   const std::string path = base_ + "/0/0" + version_, root = tile_bytes(result_, levels_, 0, 0);
@@ -180,7 +180,7 @@ TEST_F(Tiles, OfWhatIsNotThereAreRefused) {
   post("/api/v1/jobs/" + unfinished + "/cancel");
 }
 
-// The file of a deleted result is closed, so that it takes no disk space.
+// When a job is deleted, the service closes its result, because an open file keeps its disk space.
 TEST_F(Tiles, OfADeletedJobAreClosed) {
   finish_job();
   EXPECT_EQ(http_->get(base_ + "/0/0" + version_).status, 200);
@@ -204,7 +204,8 @@ TEST_F(Tiles, NeedTheRoleRead) {
   }
 }
 
-// While a job runs, its built part can be viewed. After that, its result can be viewed.
+// While a job runs, /partial serves the subvolumes that are built. After the job has succeeded,
+// there is no partial view.
 TEST_F(Tiles, OfARunningJobAreItsSubvolumes) {
   start();
   put_scene("m.glb", scene_bytes());
@@ -305,7 +306,8 @@ TEST_F(View, ServesTheFileAndTheAssets) {
   EXPECT_EQ(http_->get("/lib/dom.js").header("Content-Type"), "text/javascript; charset=utf-8");
   EXPECT_EQ(http_->get("/api/v1/jobs").status, 404);
   EXPECT_EQ(http_->send("POST", "/api/v1/view/tiles", "{}").status, 405);
-  // Any web page may send requests to this port, with the host name of the page.
+  // A page of another site can resolve its host name to this machine and send requests to this
+  // port. The Host field then has the page's name, so such requests are refused.
   EXPECT_EQ(http_->get("/api/v1/view/tiles", {{"Host", "evil.example"}}).status, 403);
 }
 
@@ -324,7 +326,8 @@ TEST_F(View, NoticesThatTheFileWasReplaced) {
   EXPECT_EQ(status("0/0", m["digest"]), 404);
 }
 
-// The file is truncated after a request has checked it, before the request reads it.
+// The file is truncated between the check of its identity and the read of its nodes. The read does
+// not crash, and the next check reports an error.
 TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   build("64");
   const FileTileSource file(path_, system_files().open_read(path_)->identity());
@@ -333,13 +336,14 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   try {
     query::encode_tile(file.dag(), kTileLevels, {0, 0});
   } catch (const Error&) {
-    // If encode_tile() throws nothing, it has made a tile from the zeros that it read.
+    // This error may occur. Otherwise encode_tile() has made a tile from the zeros that replace the
+    // missing bytes.
   }
   EXPECT_THROW(file.expect_readable(), Error);
 }
 
-// The file is truncated after it is mapped, before or while the service reads its header and
-// tables.
+// The file is truncated after it was mapped, so that its header or its tables are missing. Opening
+// it is an error, not a crash.
 TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
   build("64");
   const FileIdentity identity = system_files().open_read(path_)->identity();
@@ -358,7 +362,8 @@ TEST_F(View, AFileThatIsTruncatedWhileItIsOpenedIsAnErrorAndNoCrash) {
   }
 }
 
-// Pages contain the colors of the file, 8 x 8 x 8 cells per page.
+// A color page has the colors of up to 8 x 8 x 8 cells. Requested pages equal the pages that
+// ColorPages encodes. Invalid addresses and absent pages are refused.
 TEST_F(View, SendsColorPages) {
   build("64", "--color");
   start();

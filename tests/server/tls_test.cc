@@ -47,8 +47,8 @@ class Tls : public RunningService {
   }
 };
 
-// Requests, bodies in both directions and event streams work over TLS. A client that does not trust
-// the certificate refuses to connect. A plain HTTP request closes the connection.
+// Over TLS, uploads, downloads and event streams work. A client that does not trust the certificate
+// refuses to connect, and a plain HTTP request fails.
 TEST_F(Tls, EncryptsEverything) {
   start();
   const std::string port = url().substr(url().rfind(':'));
