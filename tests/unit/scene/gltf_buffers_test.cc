@@ -97,7 +97,8 @@ TEST(GltfBuffers, UrisThatAreNotFollowed) {
   }
 }
 
-// File names without the encoding that RFC 3986 requires are found.
+// A buffer's file is found even if its URI lacks the percent-encoding that RFC 3986 requires, or
+// has a query or a fragment.
 TEST(GltfBuffers, UrisOfOtherPrograms) {
   const std::pair<const char*, const char*> names[] = {{"mesh.bin?v=3", "mesh.bin"},
                                                        {"mesh.bin#part", "mesh.bin"},
@@ -137,7 +138,7 @@ TEST(GltfBuffers, TheExactNameComesFirst) {
   EXPECT_NE(missing.message().find("sub\\a.bin?b"), std::string::npos) << missing.message();
 }
 
-// A path that begins with backslashes is relative to the scene's folder, not absolute.
+// A path that begins with backslashes must not be read as an absolute path.
 TEST(GltfBuffers, BackslashesDoNotMakeAbsolutePaths) {
   const SceneBuilder scene = one_triangle();
   for (const char* uri : {"\\etc\\a.bin", "\\\\host\\a.bin", "%5Cetc%5Ca.bin"})
@@ -167,8 +168,9 @@ TEST(GltfBuffers, LfsPointers) {
   }
 }
 
-// Strings of many megabytes take no memory; the budget of this test is far smaller. Only strings
-// with escapes are collected by the parser. They are charged, and refused if they do not fit.
+// Strings of many megabytes take no memory, so the scene fits in a far smaller budget. The
+// exception is strings with escapes: the parser collects and charges them, and refuses the file if
+// they do not fit.
 TEST(GltfBuffers, LongStringsTakeNoMemory) {
   SceneBuilder scene = one_triangle();
   const std::string picture = "data:image/png;base64," + std::string(3000000, 'A');

@@ -111,7 +111,7 @@ double distance(const Corners& a, const Corners& b) {
 void expect_same_triangles(const std::vector<Corners>& found,
                            const std::vector<Corners>& expected) {
   ASSERT_EQ(found.size(), expected.size());
-  // The ground truth went through floats, or has nine digits.
+  // The coordinates of the expected triangles were rounded to floats or to nine digits.
   const double tolerance = 7e-8 * magnitude(expected);
   const double cell = std::max(8 * tolerance, 1e-300);
   const auto cell_of = [&](const Corners& t, size_t axis) {
@@ -181,7 +181,8 @@ TEST_F(GltfConformance, Manifest) {
     // The compressed file is tested by RealCompressed.
     if (entry.expect == "refuse-or-decode") continue;
     if (entry.file.ends_with("no_position.glb")) {
-      // Builds refuse a scene without triangles.
+      // The manifest expects a refusal. Opening the scene succeeds with no triangles; the build
+      // then refuses it.
       EXPECT_EQ(Opened(folder / entry.file).source->declared_triangles(), 0u);
       ++refused;
       continue;
@@ -208,14 +209,16 @@ TEST_F(GltfConformance, Manifest) {
   EXPECT_EQ(refused, 18u);
 }
 
-// A file without scenes draws its root nodes, which have the mesh of the set's other files.
+// A file without scenes draws its root nodes. They have the same mesh as the set's other files, so
+// the triangles of c23 are expected.
 TEST_F(GltfConformance, WithoutScenes) {
   Opened opened(kScenes / "conformance" / "c22_no_scene.glb");
   expect_same_triangles(triangles_of(*opened.source),
                         read_obj(kScenes / "conformance" / "expected" / "c23_base64.obj"));
 }
 
-// In real scenes, the counts are as expected, and also the bounds if the manifest has them.
+// Real scenes have the number of triangles and the bounds that the manifest gives. Some lines have
+// no bounds.
 TEST_F(GltfConformance, RealScenes) {
   size_t read = 0;
   for (const Entry& entry : read_manifest(kScenes / "MANIFEST.tsv", 0, 11)) {
@@ -257,7 +260,7 @@ TEST_F(GltfConformance, RealCompressed) {
 #endif
 }
 
-// Real files that cannot be read are refused with the reason by name.
+// Real files that cannot be read are refused with an error that names the reason.
 TEST_F(GltfConformance, RealRefusals) {
   const fs::path folder = kScenes / "gltf_real";
   expect_refused(folder / "lfs_pointer_as_bin.gltf", "PrimitiveModes.bin is a Git LFS pointer");

@@ -59,7 +59,8 @@ std::string glb_with_chunks(std::string json,
   return "glTF" + little_endian(2) + little_endian(static_cast<uint32_t>(12 + body.size())) + body;
 }
 
-// Chunks of other types may be anywhere, and bytes too few for a chunk are padding.
+// Chunks of unknown types may be anywhere after the JSON. Up to seven zeros or blanks after the
+// last chunk are padding; other bytes there are an error.
 TEST(GltfContainer, OtherChunks) {
   SceneBuilder scene = one_triangle();
   scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
@@ -71,7 +72,7 @@ TEST(GltfContainer, OtherChunks) {
           glb_with_chunks(json, {{"XTRA", ""}, {"MORE", "1"}, {bin_type, bin}, {"LAST", "x"}}))
           .size(),
       1u);
-  // The length of the JSON chunk may be the length without its padding.
+  // The header of the JSON chunk may give its length without the padding.
   const std::string padded = json + std::string(4 - json.size() % 4, ' ');
   std::string glb = glb_with_chunks(padded, {{bin_type, bin}});
   put_u32(glb, 12, static_cast<uint32_t>(json.size()));
@@ -102,7 +103,8 @@ TEST(GltfContainer, PaddedJson) {
   EXPECT_NE(error_of_file(text + "x").message(), "");
 }
 
-// NaN and infinities, in all spellings, count as null where they are not needed.
+// NaN and infinities, in the spellings of several programs, are read as null. This is an error only
+// if the reader needs the number.
 TEST(GltfNumbers, NotFinite) {
   const std::string json = one_triangle().gltf("data:;base64," + base64(one_triangle().bin));
   const auto with = [&](const std::string& member) {
@@ -119,7 +121,7 @@ TEST(GltfNumbers, NotFinite) {
     for (const std::string& member : {"\"max\":[" + text + ",2,3]", "\"min\":[0," + text + "]",
                                       "\"max\": [ " + text + " ]", "\"extras\":" + text}) {
       EXPECT_EQ(triangles_of_file(with(member)).size(), 1u) << member;
-      // The spelling crosses the end of a window.
+      // Moves the number to about the end of the parser's first window of 65536 bytes.
       for (const size_t blanks : {size_t{65536} - 400, size_t{65536} - 300})
         EXPECT_EQ(
             triangles_of_file(with("\"extras\":\"" + std::string(blanks, 'x') + "\"," + member))
@@ -148,7 +150,7 @@ TEST(GltfNumbers, NotFiniteAcrossWindows) {
   }
 }
 
-// Integers may be written like 36.0 and 3.6e1.
+// Integers may be written with a point or an exponent, like 36.0 and 3.6e1.
 TEST(GltfNumbers, WholeNumbersWithPoints) {
   SceneBuilder scene = textured(std::string());
   scene.root["images"] = {{{"bufferView", 0}}};
@@ -263,7 +265,8 @@ TEST(GltfWindows, LargerThanTheBudget) {
   EXPECT_LE(tight.budget.peak(), tight.budget.limit());
 }
 
-// Charges made while streaming are released at its end, and all others with the scene.
+// Memory that is charged while streaming is released when the stream ends; all other memory is
+// released with the scene.
 TEST(GltfWindows, ChargesAreReleased) {
   OpenScene open(one_triangle().glb());
   const uint64_t resting = open.budget.used();
@@ -318,7 +321,8 @@ TEST(GltfMemory, ArraysAreCharged) {
   }
 }
 
-// The array within one element is charged while it is read, so a large one can exceed the budget.
+// Arrays within one element are also charged while they are read, so a large array exceeds the
+// budget.
 TEST(GltfMemory, ElementsAreCharged) {
   for (const char* section : {R"("nodes":[{"children":[)", R"("scenes":[{"nodes":[)",
                               R"("skins":[{"joints":[)", R"("meshes":[{"primitives":[)"}) {
@@ -331,7 +335,8 @@ TEST(GltfMemory, ElementsAreCharged) {
   }
 }
 
-// Values in skipped members still take memory of the parser, and a number has at most 1024 digits.
+// The parser collects some data of members that are not read. This memory is charged, and a number
+// has at most 1024 characters. White space takes no memory.
 TEST(GltfMemory, WhatTheParserCollectsIsBounded) {
   const std::string rest = R"("asset":{"version":"2.0"}})", blanks(4 << 20, ' ');
   EXPECT_EQ(out_of_memory_message("{" + blanks + rest, uint64_t{2} << 20), "");
@@ -343,7 +348,7 @@ TEST(GltfMemory, WhatTheParserCollectsIsBounded) {
   EXPECT_NE(digits.message().find("a number of over 1024 characters"), std::string::npos);
 }
 
-// Strings that are passed over take no memory.
+// Strings in members that are not read take no memory.
 TEST(GltfMemory, SkippedStringsAreNotCharged) {
   SceneBuilder scene = one_triangle();
   for (int i = 0; i < 1000; ++i) scene.root["extras"].push_back(std::string(4000, 'x'));
@@ -371,8 +376,8 @@ TEST(GltfMemory, JointMatricesAreCharged) {
   }
 }
 
-// The text that tinygltf parses is written from the parser's events: without extras, with escaped
-// strings, and with several elements per section.
+// tinygltf parses a text with the materials only, which the reader writes from its JSON parser's
+// events. The text omits extras, and preserves escaped strings and several elements per section.
 TEST(GltfModel, TextOfMaterialsIsFiltered) {
   SceneBuilder scene = one_triangle();
   const std::string name = "a \"quoted\" \\ name\n\u00e9";

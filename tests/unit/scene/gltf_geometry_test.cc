@@ -91,7 +91,7 @@ TEST(GltfGeometry, InterleavedVertices) {
             (std::vector<Corners>{kLower}));
 }
 
-// A byteStride is used, also where glTF does not allow it, with a warning.
+// A byteStride that glTF does not allow is used, with a warning.
 TEST(GltfGeometry, UnusualStrides) {
   const auto expected = triangles_of_file(one_triangle().glb());
   for (const size_t stride : {2, 3, 4, 6, 300}) {
@@ -271,7 +271,8 @@ std::vector<Corners> separate_rows(const std::vector<std::vector<uint32_t>>& row
   return triangles_of_file(scene.glb());
 }
 
-// Returns a scene with one primitive, whose rows end with the largest number of T.
+// Returns a scene with one primitive that contains all rows. Each row ends with the largest number
+// of T, at which KHR_mesh_primitive_restart ends a strip or fan.
 template <class T>
 SceneBuilder joined_rows(const std::vector<std::vector<uint32_t>>& rows, int mode,
                          const std::vector<float>& positions, int component_type) {
@@ -288,7 +289,8 @@ SceneBuilder joined_rows(const std::vector<std::vector<uint32_t>>& rows, int mod
       scene, {{"attributes", {{"POSITION", position}}}, {"indices", accessor}, {"mode", mode}});
 }
 
-// Sorts the corners of each triangle, because restarts correct the winding of strips.
+// Sorts the corners of each triangle, so that comparisons ignore the winding. The reader gives all
+// triangles of a strip the same winding only if the strip has restarts.
 std::vector<Corners> without_winding(std::vector<Corners> triangles) {
   for (Corners& corners : triangles) std::ranges::sort(corners);
   return triangles;
@@ -369,7 +371,8 @@ TEST(GltfGeometry, OnlyTheExtensionRestarts) {
   EXPECT_NE(error_of_file(all.glb()).message().find("index 255"), std::string::npos);
 }
 
-// Restarts in lines do not matter, and a primitive of restarts alone has no triangles.
+// Restarts in a primitive of lines are ignored. A primitive in which every row is too short for a
+// triangle has no triangles.
 TEST(GltfGeometry, RestartsWithoutTriangles) {
   SceneBuilder scene = joined_rows<uint16_t>({{}, {}, {0, 1}}, 5, kSquare, kU16);
   Json lines = scene.root["meshes"][0]["primitives"][0];

@@ -80,8 +80,8 @@ TEST(GltfNodes, SharedMesh) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{1, 2, 3}, {21, 2, 3}, {11, 2, 3}, {31, 2, 3}}));
 }
 
-// An instance's T * R * S is applied before the node's transform. All instances count as declared
-// triangles.
+// An instance's translation * rotation * scale is applied to vertices before the node's transform.
+// The number of declared triangles includes the triangles of all instances.
 TEST(GltfNodes, GpuInstances) {
   SceneBuilder scene = corner_scene();
   std::vector<float> translations, scales;
@@ -126,8 +126,8 @@ std::vector<Warning> warnings_of(const SceneBuilder& scene) {
   return OpenScene(scene.glb()).source->warnings();
 }
 
-// A listed node with a parent keeps its parent's transform. A node that is listed twice, or with an
-// ancestor, is drawn once.
+// A scene lists root nodes. A listed node with a parent keeps its parent's transform. A node that
+// is listed twice, or together with an ancestor, is drawn once. Warnings report these cases.
 TEST(GltfNodes, ListedNodesWithParents) {
   SceneBuilder scene = corner_scene();
   scene.add("nodes", Json::object());
@@ -159,7 +159,7 @@ TEST(GltfNodes, ListedNodesWithParents) {
   expect({1}, whole, {"repeated-node"});
 }
 
-// A message names the scene and the node.
+// The warning about a listed node with a parent names the scene and the node.
 TEST(GltfNodes, ListedNodesWithParentsAreNamed) {
   SceneBuilder scene = corner_scene();
   scene.add("nodes", Json::object());
@@ -172,7 +172,8 @@ TEST(GltfNodes, ListedNodesWithParentsAreNamed) {
                 "keeps its parent's transform"}));
 }
 
-// A long chain of parents, each of them with a listed child, takes linear time.
+// Many listed nodes have the same long chain of ancestors. The time is linear in the number of
+// nodes, because the chain is not walked again for each listed node.
 TEST(GltfNodes, ManyListedNodesBelowAChain) {
   constexpr int kCount = 20000;
   SceneBuilder scene = corner_scene();
@@ -219,7 +220,8 @@ TEST(GltfNodes, HiddenNodes) {
   EXPECT_THROW(corners_of(scene), Error);
 }
 
-// A hidden joint still moves the skin, and broken meshes of hidden nodes are not read.
+// A hidden joint still moves the vertices of the skin. Meshes of hidden nodes may be broken,
+// because they are not read.
 TEST(GltfNodes, HiddenNodesAreNotChecked) {
   SceneBuilder scene = corner_scene();
   scene.add_root({{"mesh", 0}});

@@ -52,7 +52,8 @@ TEST(GltfPrimitives, PointsAndLinesAreCountedByPrimitive) {
   expect_scene(scene.glb(), {kAtRest, moved(kAtRest, 5, 0, 0)}, "points-or-lines", 4);
 }
 
-// Adds a morph target that moves all vertices by (0 0 1).
+// Returns one_triangle() with a morph target that moves all vertices by (0 0 1), and with these
+// weights.
 SceneBuilder morphed(const std::vector<double>& weights) {
   SceneBuilder scene = one_triangle();
   const int up = scene.add_positions({0, 0, 1, 0, 0, 1, 0, 0, 1});
@@ -90,7 +91,8 @@ TEST(GltfPrimitives, WithoutTargetsBesideMorphedOnes) {
   }
 }
 
-// Adds a skin with one joint that is moved by (10 0 0), and the attributes of the first primitive.
+// Returns one_triangle() with a skin of one joint that is at (10 0 0). The node with the mesh is at
+// (0 0 7), which must have no effect on skinned vertices.
 SceneBuilder skinned() {
   SceneBuilder scene = one_triangle();
   Json& attributes = primitives_of(scene)[0]["attributes"];
@@ -189,7 +191,7 @@ TEST(GltfPrimitives, TheFirstJointMovesVerticesWithoutWeights) {
   EXPECT_THAT(error_of_file(scene.glb()).message(), testing::HasSubstr("is not a finite position"));
 }
 
-// Weights of meshes that no skin moves do not matter.
+// Joint weights are ignored, even if invalid, if the node has no skin.
 TEST(GltfPrimitives, WeightsWithoutASkinAreIgnored) {
   SceneBuilder scene = weighted<float>(kF32, per_vertex(0.f, 0.f), false);
   scene.root["nodes"][0].erase("skin");

@@ -296,7 +296,8 @@ TEST(GltfRefusals, NamesAreMadePrintable) {
   EXPECT_NE(key.find("attributes.X?2026?[31m is a string"), std::string::npos) << key;
 }
 
-// Extensions that move no vertex may be required; optional ones that are not read cause a warning.
+// A file may require extensions that move no vertex. An unknown extension that the file uses but
+// does not require causes a warning.
 TEST(GltfRefusals, ExtensionsThatAreNot) {
   SceneBuilder scene = valid_scene();
   scene.root["extensionsRequired"] = {"KHR_materials_unlit", "KHR_texture_transform"};

@@ -13,7 +13,7 @@ namespace {
 
 const Corners kLowHalf = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}};
 
-// The triangle (0 0 0) (1 0 0) (0 1 0), as most programs write it.
+// Returns a file with the triangle (0 0 0) (1 0 0) (0 1 0), as most programs write it.
 std::string plain_triangle(PlyFormat format, const std::string& line_end = "\n") {
   PlyWriter ply(format, line_end);
   ply.header("comment made here").header("element vertex 3");
@@ -62,7 +62,8 @@ TEST(Ply, OtherElementsAndPropertiesAreSkipped) {
   }
 }
 
-// A header with vertices of floats and faces of a list of these types.
+// Returns a writer with the header of a mesh. Vertices have float coordinates. `list_types` is the
+// types of a face's count and of its indices.
 PlyWriter mesh_header(PlyFormat format, size_t vertices, size_t faces, const char* list_types) {
   PlyWriter ply(format);
   ply.header("element vertex " + std::to_string(vertices));
@@ -210,8 +211,8 @@ TEST(Ply, ColorsOfVertices) {
   EXPECT_EQ(colors_of(file)[1], (Rgba{65535, 65535, 65535, 65535}));
 }
 
-// Colors take all 256 values. The file has more vertices than the cache can hold, so blocks replace
-// each other.
+// The colors have all 256 values. The file has more vertices than the cache of vertices can hold,
+// so later blocks of vertices replace earlier ones.
 TEST(Ply, ColorsOfManyVertices) {
   constexpr uint32_t kVertices = 50000;
   PlyWriter ply(PlyFormat::kLittle);
@@ -258,7 +259,7 @@ TEST(Ply, FilesOfBothFormatsAreOneScene) {
   EXPECT_EQ(scene->files()[3].path, "c");
 }
 
-// A file that is truncated anywhere is refused, unless only complete words of its last line are
+// A file that is truncated anywhere is refused. In ASCII files, only the last line end may be
 // missing.
 TEST(Ply, TruncatedFilesAreRefused) {
   for (const PlyFormat format : kFormats) {

@@ -72,7 +72,7 @@ TEST(PlyVariants, StripsAfterFaces) {
   }
 }
 
-// Triangles with two equal corners only join parts of a strip, so they are left out.
+// Triangles with two equal corners only join parts of a strip, so the reader leaves them out.
 TEST(PlyVariants, JoinsOfStripsAreLeftOut) {
   EXPECT_EQ((numbers_of(
                 strips<int32_t, int32_t>(PlyFormat::kBig, "int int", {{0, 1, 2, 2, 3, 3, 4, 5}}))),
@@ -81,7 +81,7 @@ TEST(PlyVariants, JoinsOfStripsAreLeftOut) {
             (std::vector<std::array<int, 3>>{{0, 1, 2}}));
 }
 
-// The only row has more entries than a face may have corners. Triangles can be read from anywhere.
+// The only strip has more entries than a face may have corners. Reading can begin at any triangle.
 TEST(PlyVariants, LongStrips) {
   constexpr int kCount = 100000;
   std::vector<int> row;

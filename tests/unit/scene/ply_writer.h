@@ -12,7 +12,8 @@ namespace voxdag::test {
 
 enum class PlyFormat { kAscii, kLittle, kBig };
 
-// Builds a file: appends numbers in the types that the header lines name.
+// Builds a PLY file: header lines and rows of numbers. Each number is appended in the type of the
+// argument, which must be the type in the header.
 class PlyWriter {
  public:
   explicit PlyWriter(PlyFormat format, std::string line_end = "\n")

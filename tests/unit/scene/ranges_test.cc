@@ -92,9 +92,9 @@ TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
     }
 }
 
-// Two cursors take turns reading pieces of a scene with several windows, instances and files. Most
-// triangles use vertices near each other, the last ones use vertices far away, and no triangle uses
-// the vertices between.
+// Two cursors take turns reading pieces of a scene of several windows, instances and files. Most
+// triangles use the first vertices, and the last triangles also use the last vertices; no triangle
+// uses the vertices between them.
 TEST(SceneRanges, CursorsDoNotDisturbEachOther) {
   SceneBuilder scene;
   constexpr int kNear = 3000, kFar = 80'000, kVertices = kFar + kNear;

@@ -215,7 +215,8 @@ TEST(Materials, EmittedLight) {
        half,
        false,
        65535},
-      // The alpha of these modes is in the base color texture.
+      // In the mode MASK, alpha comes from the base color texture. So a material with such a
+      // texture shows the emitted light only if the light has the same texture (the next case).
       {{{"pbrMetallicRoughness", black_texture}, {"emissiveFactor", light}, {"alphaMode", "MASK"}},
        {0, 0, 0, 65535},
        true,
@@ -257,8 +258,8 @@ TEST(Materials, EmittedLight) {
   }
 }
 
-// The image of a texture is its source, if that exists. Otherwise it is an image that an extension
-// names, in a format with decoder if possible.
+// The image of a texture is its `source`, if that image exists. Otherwise it is an image that an
+// extension names, if possible in a format that voxdag can decode.
 TEST(Materials, ImagesOfExtensions) {
   const auto image_of = [](const Json& texture) {
     SceneBuilder scene = textured("");

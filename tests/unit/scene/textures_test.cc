@@ -32,7 +32,8 @@ struct Warnings : NoProgress {
   void warn(std::string_view message) override { all.emplace_back(message); }
 };
 
-// Reads the scene from memory and writes the scratch file to the disk.
+// Reads the scene from memory, and writes the scratch file to a disk that simulates the faults of
+// `plan`.
 struct ScratchFiles : MemoryFiles {
   explicit ScratchFiles(crash::FaultPlan plan) : disk(plan) {}
   std::unique_ptr<ReadableFile> open_read(const std::string& path) override {
@@ -100,7 +101,7 @@ TEST(Textures, PyramidOfOddSizes) {
     for (uint32_t x = 0; x < width; ++x) ASSERT_EQ(a->texel(0, 0, x, y), b->texel(0, 0, x, y));
 }
 
-// A page of the scratch file that was damaged is an error, not a wrong color.
+// Reading a damaged page of the scratch file is an error; it never gives a wrong color.
 TEST(Textures, DamagedPages) {
   const uint32_t width = 300, height = 200;
   const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();
@@ -140,8 +141,9 @@ TEST(Textures, LinearLight) {
   EXPECT_EQ(channel(reader->texel(0, 0, 0, 0), 3), 128u * 257);
 }
 
-// An image is in a buffer view of a data: URI. JSON may escape the URI's slashes. The image is
-// found whatever the first bytes of the buffer are; in base64 the byte 't' begins with "dA".
+// Reads an image from a view of a buffer that is a data: URI, even if JSON escapes the URI's
+// slashes, and whatever the buffer's first bytes are. With the first byte 't', the base64 text
+// begins with "dA", like the scheme "data:" in other case.
 TEST(Textures, InBase64Buffers) {
   SceneBuilder scene = textured("");
   const std::string png = png_of(1, 1, "\xff\xff\xff\x80");
@@ -173,7 +175,8 @@ TEST(Textures, InDataUrisOfOtherPrograms) {
   ASSERT_NE(url_safe, text);
   for (const char byte : png) {
     const auto value = static_cast<unsigned char>(byte);
-    // Printable characters mean themselves, also a percent sign that is not followed by digits.
+    // Printable characters stand for themselves, except the percent sign. Other bytes are
+    // percent-encoded.
     if (value > ' ' && value < 127 && value != '%')
       bytes += byte;
     else

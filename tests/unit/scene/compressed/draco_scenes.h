@@ -89,7 +89,8 @@ inline std::unique_ptr<draco::Mesh> bumpy_grid(uint32_t n, bool with_normals) {
   return mesh;
 }
 
-// `speed` is from 0 to 10. At low speeds, the encoder uses more kinds of prediction.
+// Returns the compressed mesh. `method` is a MeshEncoderMethod of Draco. `speed` is from 0 to 10;
+// at low speeds, the encoder uses more kinds of prediction.
 inline std::vector<char> encode_draco(const draco::Mesh& mesh, int method, int quantization_bits,
                                       int speed = 5) {
   draco::ExpertEncoder encoder(mesh);

@@ -35,7 +35,8 @@ std::vector<uint32_t> faces_of(const draco::Mesh& mesh) {
   return all;
 }
 
-// Returns the scene with all data uncompressed, as Draco's own decoder returns them.
+// Returns an uncompressed scene with the positions and faces of a mesh that Draco's own decoder
+// returned.
 SceneBuilder plain_scene(const draco::Mesh& mesh) {
   SceneBuilder scene;
   const int positions = scene.add_positions(values_of<float>(mesh, 0));
@@ -59,7 +60,8 @@ TEST(GltfDraco, EqualsTheDecodedScene) {
   }
 }
 
-// Adds texture coordinates that are continuous, which the encoder predicts from positions.
+// Adds texture coordinates that depend linearly on the positions, so that the encoder predicts them
+// from the positions.
 void add_texture_coordinates(draco::Mesh& mesh) {
   draco::GeometryAttribute texture;
   texture.Init(draco::GeometryAttribute::TEX_COORD, nullptr, 2, draco::DT_FLOAT32, false, 8, 0);
@@ -73,8 +75,8 @@ void add_texture_coordinates(draco::Mesh& mesh) {
   }
 }
 
-// Tests every speed of the encoder. So the data have edgebreaker connectivity with valences, all
-// predictions, and raw and tagged symbols.
+// Tests every speed of the encoder. Together, the data use edgebreaker connectivity with valences,
+// all predictions, and raw and tagged symbols.
 TEST(GltfDraco, AllEncodersAreRead) {
   for (const uint32_t n : {3u, 40u})
     for (const bool with_normals : {false, true})
@@ -213,8 +215,9 @@ TEST(GltfDraco, SkinsAreCompressed) {
   EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
 }
 
-// The triangles of a strip are the faces in the Draco data. The data lack the triangles that join
-// two strips. The reader repeats the last face once for each of these triangles.
+// The index count of a strip includes the triangles that join two strips, but Draco data do not
+// contain them. The reader repeats the last face once for each of these triangles, so that the
+// number of triangles is as declared.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
@@ -269,8 +272,10 @@ TEST(GltfDraco, CountsOfTheDataAreRead) {
     }
 }
 
-// If a mesh is large and its faces do not share normals, its counts are not checked by decoding it
-// first. Then more vertices than declared are an error, and fewer vertices are accepted.
+// If faces do not share normals, the Draco header does not give the exact number of vertices. To
+// check the accessors' number, the reader would have to decode the faces in advance, which it does
+// not do for large meshes. More vertices than declared are then an error of reading; fewer are
+// accepted.
 TEST(GltfDraco, CountsThatTheHeaderDoesNotShow) {
   const auto data = encode_draco(*bumpy_grid(60, true), draco::MESH_EDGEBREAKER_ENCODING, 10);
   const auto mesh = decode_draco(data);
@@ -305,7 +310,8 @@ TEST(GltfDraco, SurfacesHaveTheCountsOfTheData) {
   }
 }
 
-// Morph targets that are stored uncompressed must have the count of the data.
+// Morph targets are stored uncompressed. They must have as many elements as the Draco data have
+// vertices, even if the accessor of the positions has another count.
 TEST(GltfDraco, TargetsMustHaveTheCountOfTheData) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   for (const size_t targets : {20u, 25u}) {
@@ -373,8 +379,8 @@ TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
               HasSubstr("its data do not begin with the signature DRACO"));
 }
 
-// The data are truncated or changed anywhere. The scene then gives an error, or as many triangles
-// as it declares.
+// Truncated data are an error. Data with one to three flipped bits are an error or decode to
+// triangles.
 TEST(GltfDraco, DamagedDataAreErrors) {
   for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
     const auto data = encode_draco(*bumpy_grid(6, true), method, 10);
@@ -408,15 +414,16 @@ Error error_within(const std::string& file, uint64_t budget_bytes) {
   return Error(ErrorCode::kInvalidInput, "");
 }
 
-// One byte of a file can declare 64 symbols of the entropy coder, each of which takes 12 bytes in
-// tables. So the tables of a file of 400 KB would take 293 MiB.
+// Expects that a file with huge symbol tables is refused before decoding if the tables exceed the
+// budget. One byte of the file can declare 64 symbols of the entropy coder, each of which takes 12
+// bytes in the tables. So the tables of a file of 400 KB would take 293 MiB.
 void expect_tables_in_the_budget(const std::vector<char>& data_before_the_table) {
   std::vector<char> data = data_before_the_table;
   data.insert(data.end(), {1, 18});  // raw symbols of 18 bits
   const size_t table_bytes = 400000;
   for (size_t symbols = 64 * table_bytes; symbols > 0; symbols >>= 7)
     data.push_back(static_cast<char>((symbols & 127) | (symbols > 127 ? 128 : 0)));
-  data.insert(data.end(), table_bytes, '\xff');  // 64 of them have probability 0
+  data.insert(data.end(), table_bytes, '\xff');  // each byte: 64 symbols with probability 0
   const std::string file = compressed_scene(data, 3, 3).glb();
   const Error refused = error_within(file, uint64_t{256} << 20);
   EXPECT_EQ(refused.code(), ErrorCode::kOutOfMemory);

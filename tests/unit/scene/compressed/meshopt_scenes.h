@@ -13,8 +13,8 @@
 
 namespace voxdag::test {
 
-// Adds a view whose data is compressed to `bytes`. The view's own buffer, the second one, does not
-// exist.
+// Adds a view whose compressed data is `bytes`. The view itself refers to buffer 1, which
+// meshopt_glb() and khr_meshopt_glb() declare as a fallback buffer without data.
 inline int add_compressed(SceneBuilder& scene, const std::vector<unsigned char>& bytes,
                           size_t count, size_t stride, const char* mode,
                           Json more = Json::object()) {
@@ -44,7 +44,7 @@ inline std::string meshopt_glb(const SceneBuilder& scene) {
   return make_glb(whole.dump(), scene.bin);
 }
 
-// Returns the scene with the Khronos form of the extension.
+// Returns a GLB of the scene that uses KHR_meshopt_compression instead of EXT_meshopt_compression.
 inline std::string khr_meshopt_glb(const SceneBuilder& scene) {
   SceneBuilder khr = scene;
   for (Json& view : khr.root["bufferViews"]) {

@@ -28,8 +28,8 @@ std::vector<unsigned char> encode_sequence(const std::vector<uint32_t>& indices)
   return out;
 }
 
-// Encodes and decodes the indices. The codec may rotate the corners of triangles, so the
-// uncompressed scene must store the decoded indices.
+// Returns the indices after encoding and decoding them. The codec may rotate the corners of
+// triangles, so a scene with uncompressed indices must store the decoded ones to be equal.
 std::vector<uint32_t> turned(const std::vector<uint32_t>& indices) {
   const auto bytes = encode_triangles(indices);
   std::vector<uint32_t> out(indices.size());
@@ -174,12 +174,13 @@ TEST(GltfMeshopt, ColorFilter) {
     SceneBuilder scene = one_triangle();
     return read(scene.add_view(values), scene, type, "EXT");
   };
-  // Components of 8, 6 and 2 bits: Y, Co, Cg, and alpha below the bit that marks the size.
+  // Three colors with 8, 6 and 2 bits per component. A color is Y, Co, Cg and alpha. The highest
+  // set bit of the last byte marks the number of bits; the bits below it are alpha.
   const std::vector<uint8_t> encoded8 = {100, 30, 0xec, 0xff, 31, 0, 0, 0x20, 3, 0, 0, 2};
   const std::vector<uint8_t> decoded8 = {150, 80, 90, 255, 125, 125, 125, 0, 255, 255, 255, 0};
   EXPECT_EQ(compressed(encoded8, kU8, "KHR"), plain(decoded8, kU8));
   EXPECT_EQ(compressed(encoded8, kU8, "EXT"), plain(decoded8, kU8));
-  // Components of 16, 12 and 8 bits.
+  // Three colors with 16, 12 and 8 bits per component.
   const std::vector<uint16_t> encoded16 = {40000, 100,   0xff9c, 0xc000, 4095, 0,
                                            0,     0xfff, 128,    0,      0,    0x80};
   const std::vector<uint16_t> decoded16 = {40200, 39900, 40000, 32768, 65535, 65535,

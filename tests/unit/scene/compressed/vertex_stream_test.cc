@@ -45,7 +45,8 @@ TEST(VertexStream, IsRecognizedByItsFirstByte) {
   EXPECT_TRUE(gltf::is_vertex_stream_1(std::as_bytes(std::span(written))));
 }
 
-// The specification's example of deltas of four bits, in the first byte of 16 elements.
+// Decodes the specification's example of four-bit deltas. They belong to the first byte of 16
+// elements; the other bytes are 0.
 TEST(VertexStream, ExampleOfTheSpecification) {
   const std::vector<unsigned char> stream = {
       0xa1, 0xa8, 3, 0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5, 0, 0, 0, 0, 0, 0,
@@ -61,8 +62,8 @@ TEST(VertexStream, ExampleOfTheSpecification) {
   }
 }
 
-// A truncated stream and a stream with surplus bytes are refused. No byte beyond the stream is
-// read.
+// Truncated streams, surplus bytes and unknown channel modes are refused. With flipped bits, the
+// decoder reads no byte beyond the stream (the address sanitizer checks this).
 TEST(VertexStream, DamagedStreams) {
   std::mt19937 random(2);
   const std::string bytes = smooth_bytes(300 * 12, random);

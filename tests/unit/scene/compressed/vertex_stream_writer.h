@@ -11,7 +11,8 @@
 
 namespace voxdag::test {
 
-// Appends 16 deltas of `bits` bits.
+// Appends a group of 16 deltas with `bits` bits each. Deltas that do not fit are marked by the
+// largest value, and follow as complete bytes.
 inline void write_group(std::vector<unsigned char>& out, const std::array<uint8_t, 16>& deltas,
                         unsigned bits) {
   if (bits == 0) return;
@@ -28,7 +29,9 @@ inline void write_group(std::vector<unsigned char>& out, const std::array<uint8_
   out.insert(out.end(), whole.begin(), whole.end());
 }
 
-// The deltas of one channel: four bytes of each element.
+// Returns the deltas of a channel, which is four bytes of each element, from element `before` to
+// element `now`. Mode 0 subtracts bytes, mode 1 subtracts 16-bit numbers, and other modes XOR and
+// rotate 32-bit numbers by mode >> 4 bits.
 inline std::array<uint8_t, 4> channel_delta(const uint8_t* before, const uint8_t* now,
                                             unsigned mode) {
   std::array<uint8_t, 4> delta{};
@@ -55,7 +58,8 @@ inline std::array<uint8_t, 4> channel_delta(const uint8_t* before, const uint8_t
   return delta;
 }
 
-// `bytes` are the elements. `modes` has one channel mode for every four bytes of an element.
+// Returns the stream of the elements in `bytes`, which have `stride` bytes each. `modes` has one
+// channel mode for every four bytes of an element.
 inline std::vector<unsigned char> write_vertex_stream_1(const std::string& bytes, size_t stride,
                                                         const std::vector<uint8_t>& modes,
                                                         unsigned seed) {

@@ -204,7 +204,8 @@ TEST(GenerateInstances, SpheresHaveAsManyTriangles) {
   EXPECT_GT(shared.report.instances, 10u);
 }
 
-// Soup has exactly the requested number of triangles, of all promised kinds.
+// Soup has exactly the requested number of triangles. Among them are points (three equal corners),
+// triangles with two equal corners, triangles in planes of constant x, and very large triangles.
 TEST(GenerateSoup, HoldsDegeneratesAndSlivers) {
   GenerateOptions options = small(SceneKind::kSoup);
   options.triangles = 50'007;
@@ -239,7 +240,8 @@ TEST(GenerateTerrain, IsASquareWithoutGaps) {
   EXPECT_EQ(heights.size(), 301u * 301);
 }
 
-// The numbers of triangles of a city and of spheres differ from the request by at most a quarter.
+// Cities and spheres have about the requested number of triangles: it differs from the request by
+// at most a quarter.
 TEST(GenerateSize, IsAboutWhatWasAsked) {
   for (SceneKind kind : {SceneKind::kCity, SceneKind::kSpheres}) {
     SCOPED_TRACE(scene_kind(kind).name);
@@ -291,7 +293,8 @@ TEST(GenerateLimit, MoreThanAGlbHoldsIsRefused) {
   EXPECT_EQ(refusal(terrain), ErrorCode::kLimit);
 }
 
-// Other scenes that are too large are refused while they are counted. The message gives the limit.
+// If the size of a scene is known only after counting its meshes, counting stops with an error when
+// the size exceeds the limit. The message gives the limit.
 TEST(GenerateLimit, CountingStopsAtTheLimit) {
   MeshBuilder full;
   while (full.vertices() < MeshBuilder::kMaxVertices) full.add_vertex({1, 2, 3});
@@ -311,7 +314,7 @@ TEST(GenerateLimit, CountingStopsAtTheLimit) {
   }
 }
 
-// An option that a kind does not have is refused.
+// An option that does not apply to the kind of scene is refused, and so is an unknown kind.
 TEST(GenerateOptions, WhatDoesNotApplyIsRefused) {
   EXPECT_EQ(refusal(small(SceneKind::kSoup, true)), ErrorCode::kInvalidInput);
   EXPECT_EQ(refusal(small(SceneKind::kTerrain, true)), ErrorCode::kInvalidInput);

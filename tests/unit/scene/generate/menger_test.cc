@@ -35,9 +35,9 @@ bool solid(int x, int y, int z, int size) {
   return true;
 }
 
-// Computes the voxels from the definition. A corner at coordinate k snaps to just above k. So the
-// face between the cells x - 1 and x sets the voxels at x, from y to y + 1 and from z to z + 1. The
-// same holds for the other axes.
+// Computes the voxels from the definition of the sponge. A corner at coordinate k snaps to slightly
+// above k. So the unit face between the cells x - 1 and x is in the voxels at x, and reaches from y
+// to y + 1 and from z to z + 1. The other axes are alike.
 oracle::Voxels expected_voxels(uint32_t level, int resolution) {
   const int size = power(3, level);
   oracle::Voxels voxels(resolution);

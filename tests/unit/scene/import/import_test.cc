@@ -74,7 +74,8 @@ TEST_F(Import, Off) {
   EXPECT_EQ(report.meshes, 1u);
   EXPECT_THAT(warnings_, IsEmpty());
   EXPECT_TRUE(is_imported_scene(*system_files().open_read(glb_)));
-  // Both triangles of the concave face use its inner corner, as in a PLY file.
+  // The concave face is divided at its inner corner, as in a PLY file, so both of its triangles
+  // have this corner.
   const std::array<double, 3> inner{1, 1, 0};
   const auto all = triangles();
   ASSERT_EQ(all.size(), 3u);
@@ -125,7 +126,7 @@ TEST_F(Import, Binary3ds) {
   import("a.3ds", max_3ds());
   EXPECT_EQ(material().factor, (std::array<uint16_t, 4>{65535, 0, 0, 65535}));
   EXPECT_EQ(material().name, "red");
-  // The z axis of 3DS files points upward.
+  // The z axis of 3DS files points upward, in glTF the y axis, so (x y z) becomes (x z -y).
   EXPECT_EQ(triangles(), std::vector<Corners>({{{{0, 0, 0}, {1, 0, 0}, {0, 0, -1}}}}));
 }
 

@@ -11,7 +11,7 @@
 
 namespace voxdag::test {
 
-// A concave quadrilateral and a triangle.
+// An OFF file with a concave quadrilateral and a triangle.
 inline const std::string kOff =
     "OFF\n5 2 0\n0 0 0\n4 1 0\n0 2 0\n1 1 0\n4 4 9\n4 0 1 2 3\n3 0 1 4\n";
 

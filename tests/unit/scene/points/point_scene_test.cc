@@ -1,4 +1,4 @@
-// Points as triangles: one degenerate triangle, or a cube.
+// Each point of a file becomes one degenerate triangle or, if the options have a radius, a cube.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

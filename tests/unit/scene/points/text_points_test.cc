@@ -109,7 +109,8 @@ TEST(TextPoints, Colors) {
   // Without a decimal point, 1 means 1/255 of full intensity.
   EXPECT_EQ(color_of("1 2 3 1 0 0\n"), (Color{light_in_text(1 / 255.0), 0, 0, 65535}));
   EXPECT_EQ(color_of("1 2 3 0.5 0 0\n1 2 3 2 0 0\n")[0], light_in_text(0.5 / 255));
-  // Normals and other numbers are not colors. Without names, only six columns may have colors.
+  // Without column names, only the last three of exactly six columns can be colors, and only if
+  // their values are in a range of colors. Normals and other numbers are not.
   EXPECT_EQ(color_of("1 2 3 0 0 1\n1 2 3 0 -1 0\n"), white);
   EXPECT_EQ(color_of("1 2 3 0 0 300\n"), white);
   EXPECT_EQ(color_of("1 2 3 0 0 0 0\n"), white);
@@ -144,14 +145,15 @@ TEST(TextPoints, ManyRowsFromAnyRowOn) {
   }
 }
 
-// The name has no ending here, so the contents decide: other text files are refused.
+// The file's name has no extension, so the contents decide whether it has points. Other text files
+// are refused.
 TEST(TextPoints, OtherTextFilesAreRefused) {
   for (const char* file : {"v 1 2 3\nf 1 2 3\n", "OFF\n8 6 12\n0 0 0\n", "# .PCD v.7\nVERSION .7\n",
                            "1 2\n3 4\n", "version https://git-lfs\n", "x,y,z\na,b,c\n", "", "\n\n"})
     EXPECT_THAT(message_of(file), HasSubstr("folder/scene: ")) << file;
 }
 
-// A text whose first row is bad is read as points because of its ending.
+// A text file with the extension of point files is read as points even if its first row is bad.
 TEST(TextPoints, EndingsMakeTextAFileOfPoints) {
   for (const char* name : {"a.xyz", "a.TXT", "b.csv"}) {
     MemoryFiles files;

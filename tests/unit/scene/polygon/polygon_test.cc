@@ -27,9 +27,9 @@ std::vector<double> in_space(const Outline& outline) {
   return xyz;
 }
 
-// Triangulates the outline. Checks that all triangles run in the outline's direction, and that
+// Triangulates the outline. Checks that all triangles have the outline's orientation, and that
 // their areas sum to the outline's area, so that they cover it without overlap. Returns false,
-// without checks, if the triangulator reports a doubtful outline.
+// without checks, if the triangulator reports the outline as doubtful (its edges cross).
 bool is_covered(const Outline& outline) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");
@@ -56,7 +56,7 @@ bool is_covered(const Outline& outline) {
   return true;
 }
 
-// Checks the outline with every first corner, in both directions.
+// Checks the outline with each of its corners as the first, in both directions.
 void check_all_ways(Outline outline) {
   for (int direction = 0; direction < 2; ++direction) {
     for (size_t i = 0; i < outline.size(); ++i) {
@@ -140,8 +140,9 @@ TEST(Polygon, LargeShapesAreCovered) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
 }
 
-// Convex polygons, and polygons that the first corner sees completely, keep their fan. So do
-// polygons of floats that are convex up to rounding.
+// Polygons that a fan of triangles from the first corner covers are divided into this fan: convex
+// polygons, and others of which the first corner sees every point. So are polygons whose
+// coordinates are floats and that are convex up to rounding.
 TEST(Polygon, FansAreKept) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");
