@@ -16,8 +16,8 @@ struct SmallNode {
   uint64_t brick;
 };
 
-// Returns pairs of nodes, one pair after the other. The two hashes of a pair have equal upper
-// halves. The function finds the pairs by trial.
+// Returns pairs of different nodes, one pair after the other, whose hashes have equal upper halves.
+// Finds the pairs by trying random nodes.
 std::vector<SmallNode> colliding_nodes() {
   std::unordered_map<uint32_t, SmallNode> by_half_hash;
   std::vector<SmallNode> found;
@@ -35,7 +35,8 @@ std::vector<SmallNode> colliding_nodes() {
   return found;
 }
 
-// Adds a triangle in every voxel of the node's brick. The node has number `index` in the grid.
+// Adds a triangle in every voxel of the node's brick. `index`, from 0 to 63, is the number of the
+// node's cube: the grid has 4^3 cubes of 8 voxels per edge.
 void place(const SmallNode& node, int index, oracle::Triangles& scene) {
   for (int bit = 0; bit < 64; ++bit) {
     if (!(node.brick >> bit & 1)) continue;

@@ -102,7 +102,8 @@ TEST_P(Memory, SmallestCubeFitsWithAllBricksDifferent) {
   expect_equals(build(*open(), task, scene, kSmallestBudget), truth, task);
 }
 
-// Builds a cube. Splits it until the parts fit in the smallest budget.
+// Builds a cube with the smallest budget. If it does not fit, builds its eight children instead,
+// recursively.
 class Splitter {
  public:
   Splitter(Backend& backend, uint32_t grid_levels, const oracle::Triangles& scene)

@@ -24,7 +24,8 @@ oracle::SolidRule oracle_rule(SolidRule rule) {
   return rule == SolidRule::kWinding ? oracle::SolidRule::kWinding : oracle::SolidRule::kParity;
 }
 
-// Returns the views from the low faces of a cube, computed from all triangles of the scene.
+// Returns the information about surfaces outside the cube for its build: the views (view_of()) from
+// the sample rows' points on the low faces of the cube, computed from all triangles of the scene.
 SolidEntry entry_of(const oracle::Triangles& scene, const Cube& cube, uint32_t levels,
                     SolidRule rule) {
   const int64_t edge = cube.edge_voxels(levels);
@@ -120,8 +121,9 @@ void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, in
   }
 }
 
-// The voxels equal the oracle's if there are more components that touch no block corner than the
-// backend collects before it decides them. Some of them are in the same block.
+// The voxels equal the oracle's if there are very many components of empty voxels that touch no
+// block corner. The backend collects such components, and here must decide them in several batches.
+// Some of them are in the same block.
 TEST_P(Solids, EqualTheOracleWithManyComponents) {
   const auto backend = open();
   oracle::Triangles scene;

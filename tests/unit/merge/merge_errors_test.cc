@@ -17,8 +17,8 @@ class MergeErrors : public testing::Test {
     std::filesystem::create_directory(harness_.scratch_folder());
   }
 
-  // Merges. Checks that this throws an Error with this code, and leaves the scratch folder empty
-  // and no partial file.
+  // Expects that a merge throws an Error with this code, leaves the scratch folder empty, and
+  // leaves no partial file. Returns the Error.
   Error merge_fails(ErrorCode code, const MergeOptions& options = {}) {
     try {
       harness_.merge(options);
@@ -35,7 +35,7 @@ class MergeErrors : public testing::Test {
   MergeHarness harness_;
 };
 
-// A flipped bit anywhere in the artifacts is detected, with any number of threads.
+// A flipped bit in the data or the index of any artifact is detected, with any number of threads.
 TEST_F(MergeErrors, DamagedArtifactsAreCorrupt) {
   const std::string path = segment_path(harness_.folder().path(), 7);
   for (const ArtifactRef& ref : harness_.artifacts())

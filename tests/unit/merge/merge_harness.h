@@ -27,7 +27,7 @@ struct MergeOptions {
   CancelToken* cancel = nullptr;
   Checkpoint* checkpoint = nullptr;
   Progress* progress = nullptr;
-  double checkpoint_interval_s = 0;  // 0: after every level, and the merge waits for each save
+  double checkpoint_interval_s = 0;  // 0: after every level; the merge waits for each
 };
 
 struct Merged {

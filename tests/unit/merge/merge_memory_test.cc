@@ -92,8 +92,8 @@ TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheBudget) {
   EXPECT_GT(merged.report.streamed_groups, 0u);
 }
 
-// There are few distinct hashes, so some buckets are too large to be sorted. They are merged row by
-// row, although there is enough memory for the rest.
+// The merge divides rows by their hashes into buckets and sorts each. With few distinct hashes,
+// some buckets are too large to be sorted, and are merged row by row. The file is the same.
 TEST(MergeMemory, BucketsOfFewHashesGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(5, 128);
   MergeHarness harness(7, 4);
