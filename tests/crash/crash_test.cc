@@ -20,7 +20,8 @@ class FineCrashTest : public CrashTest {
     BuildSpec spec = CrashTest::spec();
     spec.geometry.resolution = 2048;
     spec.run.subvolume_edge = 512;
-    // Durable triangles: writes checkpoints during the passes over the triangles.
+    // If the triangles are durable, the build writes checkpoints even during its passes over the
+    // triangles.
     if (is_durable()) spec.run.checkpoint_interval_s = 1e-4;
     return spec;
   }

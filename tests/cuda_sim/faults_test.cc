@@ -17,8 +17,8 @@ oracle::Triangles scene() {
   return oracle::make_scene(oracle::SceneKind::kSpanning, 5, oracle::region_of(kTask.cube, 6), 6);
 }
 
-// Builds with a planned failure. Returns whether the failure happened, that is, whether the build
-// makes so many calls.
+// Builds with a planned failure, and checks the outcome. Returns true if the failure happened, that
+// is, if the build made enough calls of this kind.
 bool build_with(Backend& backend, const cuda_sim::Fault& fault, const oracle::Dag& truth) {
   cuda_sim::plan_fault(fault);
   try {

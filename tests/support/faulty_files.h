@@ -66,7 +66,8 @@ class FaultyFiles : public voxdag::ForwardingFiles {
   template <class Operation, class Half, class Flipped>
   void write(const Operation& operation, const Half& half, const Flipped& flipped);
   void read();
-  // Renames a file and records this for a power cut.
+  // Renames a file, and records the old name and a replaced file, so that cut_power() can restore
+  // them.
   void rename_unsynced(const std::string& from, const std::string& to);
   // Reverts files and names to their state at the last sync, then sends SIGKILL.
   void cut_power();

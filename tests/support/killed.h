@@ -8,8 +8,8 @@
 
 namespace voxdag {
 
-// Runs work() in a child process. Returns true if SIGKILL ended the child. work() must not use
-// threads of the parent, because the child does not have them.
+// Runs work() in a child process. Returns true if SIGKILL ended the child. work() must not rely on
+// other threads of the parent, because fork() does not copy them.
 template <class Work>
 bool is_killed(const Work& work) {
   const pid_t child = fork();

@@ -90,7 +90,8 @@ using voxdag::cuda_sim::on_access;
   void __tsan_unaligned_read##bytes(void* p) { on_access(p, bytes, Access::kRead); } \
   void __tsan_unaligned_write##bytes(void* p) { on_access(p, bytes, Access::kWrite); }
 
-// The atomics of the host's code that the backend uses.
+// Atomic operations of the backend's host code: the compiler replaces them by calls of these
+// functions.
 #define VOXDAG_ATOMIC(bits, T)                                 \
   T __tsan_atomic##bits##_load(const volatile T* p, int) {     \
     return __atomic_load_n(p, __ATOMIC_SEQ_CST);               \
@@ -123,7 +124,7 @@ void __tsan_vptr_read(void**) {}
 void __tsan_vptr_update(void**, void*) {}
 void __tsan_read_range(void* p, size_t bytes) { on_access(p, bytes, Access::kRead, true); }
 void __tsan_write_range(void* p, size_t bytes) { on_access(p, bytes, Access::kWrite, true); }
-// Clang calls these for copies of structures.
+// Clang inserts calls of these functions for copies of structures.
 void* __tsan_memcpy(void* to, const void* from, size_t bytes) {
   on_access(const_cast<void*>(from), bytes, Access::kRead, true);
   on_access(to, bytes, Access::kWrite, true);

@@ -149,7 +149,7 @@ cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t, cudaMemPoolAttr, void*) {
   return Begin().status;
 }
 
-// The pool holds exactly the memory in use.
+// Returns the memory in use for every attribute: the simulated pool keeps no unused memory.
 cudaError_t cudaMemPoolGetAttribute(cudaMemPool_t, cudaMemPoolAttr, void* value) {
   const Begin call;
   *static_cast<uint64_t*>(value) = g_in_use;

@@ -81,8 +81,8 @@ class Block {
     for (size_t i = 0; i < ready.size(); ++i) resume(ready[order.next()]);
   }
 
-  // Not inlined, because a fiber may resume on another host thread, where g_running is a different
-  // variable.
+  // Sets the thread's numbers in g_running. Not inlined, because a fiber may resume on another host
+  // thread, where g_running is a different variable.
   [[gnu::noinline]] void identify() {
     g_running.thread = current_->thread;
     g_running.number = g_running.first + g_running.block * launch_->threads + current_->thread;

@@ -10,7 +10,7 @@ namespace oracle {
 
 struct Crossing {
   bool exists = false;     // the triangle crosses the row
-  bool is_before = false;  // p is beyond the crossing
+  bool is_before = false;  // the crossing is before p on the row
   int sign = 0;            // +1 where a ray along the axis enters the solid
 };
 
@@ -22,8 +22,8 @@ Crossing crossing_of(const Triangle& triangle, const Point& p, int axis);
 // or 0 if the triangle does not cross this leg; length > 0.
 int leg_crossing(const Triangle& triangle, const Point& p, int axis, int64_t length);
 
-// Returns the winding number of p: the sum of the crossings that a ray from p against the direction
-// of the axis meets. On a closed mesh it is the same for every axis.
+// Returns the winding number of p: the sum of the signs of the crossings that a ray from p against
+// the direction of the axis meets. On a closed mesh it is the same for every axis.
 int winding_number(const Triangles& triangles, const Point& p, int axis);
 
 }  // namespace oracle

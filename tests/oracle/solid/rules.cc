@@ -12,8 +12,8 @@ namespace {
 
 using Cell = std::array<int, 3>;
 
-// A connected set of empty voxels, the number of its sample points, and the sum of view() over
-// them.
+// A connected set of empty voxels that is filled as one unit or not at all, the number of its
+// sample points, and the sum of view() over these points.
 struct Unit {
   std::vector<Cell> cells;
   int views = 0, points = 0;
@@ -74,7 +74,8 @@ class Filler {
     return empty;
   }
 
-  // Descends to the maximal empty cubes and to the blocks with voxels.
+  // Decides about all empty voxels of a cube: descends to the maximal empty cubes, which are
+  // decided as one unit, and to the blocks that contain shell voxels.
   void visit_cube(const Cell& low, int edge) {
     if (is_empty_cube(low, edge)) return decide_cube(low, edge);
     if (edge == block_) return decide_block(low);

@@ -41,8 +41,9 @@ void add_box(Triangles& out, const Point& low, const Point& high, int faces = 63
     }
 }
 
-// Adds a surface of rotation, a ring of `around` by `along` quads. `at(u, v)` has period 1 in u. If
-// `closed`, it has period 1 in v as well. The normal is du x dv.
+// Adds a ring-shaped surface of `around` by `along` quads with the corners at(u, v), where u and v
+// are from 0 to 1. at() has period 1 in u and, if `closed` is true, in v. The front faces are on
+// the side of (derivative by u) x (derivative by v).
 template <class At>
 void add_surface(Triangles& out, int around, int along, bool closed, At at) {
   const auto point = [&](int i, int j) {
