@@ -35,8 +35,7 @@ std::vector<uint32_t> faces_of(const draco::Mesh& mesh) {
   return all;
 }
 
-// Returns an uncompressed scene with the positions and faces of a mesh that Draco's own decoder
-// returned.
+// Returns a scene that stores the positions and faces of `mesh` uncompressed.
 SceneBuilder plain_scene(const draco::Mesh& mesh) {
   SceneBuilder scene;
   const int positions = scene.add_positions(values_of<float>(mesh, 0));
@@ -60,8 +59,7 @@ TEST(GltfDraco, EqualsTheDecodedScene) {
   }
 }
 
-// Adds texture coordinates that depend linearly on the positions, so that the encoder predicts them
-// from the positions.
+// Adds texture coordinates linear in the positions, so that the encoder predicts them from these.
 void add_texture_coordinates(draco::Mesh& mesh) {
   draco::GeometryAttribute texture;
   texture.Init(draco::GeometryAttribute::TEX_COORD, nullptr, 2, draco::DT_FLOAT32, false, 8, 0);
@@ -215,9 +213,8 @@ TEST(GltfDraco, SkinsAreCompressed) {
   EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
 }
 
-// The index count of a strip includes the triangles that join two strips, but Draco data do not
-// contain them. The reader repeats the last face once for each of these triangles, so that the
-// number of triangles is as declared.
+// A strip's index count includes the triangles that join two strips, which Draco data do not
+// contain. The reader repeats the last face once for each of these triangles.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
@@ -272,10 +269,8 @@ TEST(GltfDraco, CountsOfTheDataAreRead) {
     }
 }
 
-// If faces do not share normals, the Draco header does not give the exact number of vertices. To
-// check the accessors' number, the reader would have to decode the faces in advance, which it does
-// not do for large meshes. More vertices than declared are then an error of reading; fewer are
-// accepted.
+// If faces do not share normals, only decoding shows the number of vertices, and large meshes are
+// not decoded for this check. Then more vertices than declared are an error; fewer are accepted.
 TEST(GltfDraco, CountsThatTheHeaderDoesNotShow) {
   const auto data = encode_draco(*bumpy_grid(60, true), draco::MESH_EDGEBREAKER_ENCODING, 10);
   const auto mesh = decode_draco(data);
@@ -310,8 +305,7 @@ TEST(GltfDraco, SurfacesHaveTheCountsOfTheData) {
   }
 }
 
-// Morph targets are stored uncompressed. They must have as many elements as the Draco data have
-// vertices, even if the accessor of the positions has another count.
+// Uncompressed morph targets must have as many elements as the Draco data have vertices.
 TEST(GltfDraco, TargetsMustHaveTheCountOfTheData) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   for (const size_t targets : {20u, 25u}) {
@@ -379,8 +373,7 @@ TEST(GltfDraco, WhatDoesNotFitIsRefusedByName) {
               HasSubstr("its data do not begin with the signature DRACO"));
 }
 
-// Truncated data are an error. Data with one to three flipped bits are an error or decode to
-// triangles.
+// Truncated data are an error. Data with flipped bits are an error or decode to triangles.
 TEST(GltfDraco, DamagedDataAreErrors) {
   for (const int method : {draco::MESH_SEQUENTIAL_ENCODING, draco::MESH_EDGEBREAKER_ENCODING}) {
     const auto data = encode_draco(*bumpy_grid(6, true), method, 10);
