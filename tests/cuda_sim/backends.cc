@@ -11,8 +11,8 @@
 namespace voxdag {
 namespace {
 
-// Sets a separate schedule for every subvolume, and checks that its build releases all device
-// memory.
+// Wraps the CUDA backend. Runs every subvolume with another schedule (schedule.h), and checks that
+// the build releases all device memory.
 class Checked : public Backend {
  public:
   explicit Checked(Method method) : backend_(make_cuda_backend(method)) {}

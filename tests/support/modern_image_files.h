@@ -8,7 +8,8 @@
 namespace voxdag::test {
 
 #ifdef VOXDAG_HAS_WEBP
-// `pixels` is RGBA with 8 bits. Lossless images also keep the colors of transparent pixels.
+// Returns a WebP file. `pixels` is RGBA with 8 bits. Lossless images also keep the colors of
+// transparent pixels.
 std::string webp_file(uint32_t width, uint32_t height, const std::string& pixels,
                       bool is_lossless = true);
 // Returns an animation of one frame.
@@ -25,7 +26,7 @@ struct AvifFormat {
   bool has_alpha = true;
   int tile_columns = 1;  // over 1: a grid of tiles in one row
 };
-// `pixels` is RGBA with 8 bits. The planes are encoded without loss.
+// Returns an AVIF file. `pixels` is RGBA with 8 bits. The planes are encoded without loss.
 std::string avif_file(const AvifFormat& format, const std::string& pixels);
 // Returns the pixels that the library's own conversion gives for a file: RGBA with 8 bits.
 std::string pixels_by_libavif(const std::string& file);

@@ -201,8 +201,8 @@ INSTANTIATE_TEST_SUITE_P(Ways, MergeResume,
                          [](const auto& test) { return test.param.name; });
 
 // In each case, a bit is flipped in a state, a position map, an intermediate artifact or the
-// partial file, or this file is missing. The merge never writes a wrong DAG. If its inputs are
-// still available, it starts over.
+// partial file, or the partial file is missing. The merge never writes a wrong DAG. If its inputs
+// are still available, it starts over.
 TEST(MergeDamage, DamageStartsOver) {
   const oracle::Voxels voxels = noise_voxels(33, 256);
   struct Way {

@@ -382,7 +382,7 @@ TEST(GltfGeometry, RestartsWithoutTriangles) {
   EXPECT_EQ(triangles_of_file(scene.glb()).size(), 2u);
 }
 
-// Vertices are moved by the mesh's weights, or by the node's weights if it has any.
+// Morph targets move vertices by the mesh's weights, or by the node's weights if it has any.
 TEST(GltfGeometry, MorphTargetsAtRest) {
   SceneBuilder scene;
   const int positions = scene.add_positions({0, 0, 0, 1, 0, 0, 0, 1, 0});

@@ -156,7 +156,8 @@ TEST(GltfPrimitives, WeightsAreDividedByTheirSum) {
   expect(weighted<uint16_t>(kU16, per_vertex<uint16_t>(128, 128), false), "unnormalized-weights");
 }
 
-// The weights of all sets are added up.
+// A vertex can have several sets of weights (WEIGHTS_0, WEIGHTS_1). Only the sum over all sets must
+// be 1.
 TEST(GltfPrimitives, WeightsOfSeveralSetsAreOneSum) {
   SceneBuilder scene = weighted<float>(kF32, per_vertex(0.25f, 0.25f), false);
   Json& attributes = primitives_of(scene)[0]["attributes"];
@@ -168,7 +169,7 @@ TEST(GltfPrimitives, WeightsOfSeveralSetsAreOneSum) {
   expect_scene(scene.glb(), expected, "unnormalized-weights", 3);
 }
 
-// If a sum differs from 1 only by rounding, the matrices are not divided by it.
+// If the sum of a vertex's weights differs from 1 only by rounding, the weights are used unchanged.
 TEST(GltfPrimitives, RoundedWeightsAreUsedUnchanged) {
   const float third = 1.f / 3;
   const double sum = 3 * static_cast<double>(third);

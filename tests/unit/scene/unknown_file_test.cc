@@ -1,4 +1,4 @@
-// Files that are not scenes are refused by the name of their format.
+// Files that are not scenes are refused with an error that names their format.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

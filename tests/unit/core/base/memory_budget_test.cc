@@ -55,8 +55,8 @@ TEST(MemoryBudget, NamesWhatDidNotFit) {
   EXPECT_EQ(budget.used(), 300u);
 }
 
-// A share charges itself and all budgets above it. If one of them has no room, the charges already
-// made are undone.
+// A budget with a parent is a share of the parent. Charging a share also charges its parent, and
+// the parent's parent. If one of them has no room, no charge remains.
 TEST(MemoryBudget, SharesChargeTheirParents) {
   MemoryBudget whole(100);
   MemoryBudget half(50, &whole);

@@ -44,8 +44,8 @@ TEST(Snap, IsOddAndStaysInItsVoxel) {
   }
 }
 
-// Compares with the formula, operation by operation, for a grid whose origin and edge are not round
-// numbers.
+// Compares snapping with its formula, written out operation by operation, for a grid whose origin
+// and edge are not round numbers.
 TEST(Snap, IsThatOfTheDesign) {
   std::mt19937_64 random(12);
   std::uniform_real_distribution<double> uniform(-3, 5);

@@ -16,7 +16,8 @@ class ReaderTest : public testing::Test {
   const std::string path_ = folder_.file("scene.vdag");
 };
 
-// Sets the voxels of a walk, and counts the visits.
+// A visitor for walks. Collects the voxels that the walk visits, and counts the visited nodes and
+// bricks.
 struct Collector {
   explicit Collector(int edge) : voxels(edge) {}
   bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) {
