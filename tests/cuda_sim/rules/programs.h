@@ -20,7 +20,8 @@ std::vector<BrokenProgram> broken_programs();
 // barrier, and reads its neighbor's word. Returns the words that the threads read.
 std::vector<uint32_t> exchange_with_neighbors(uint32_t blocks, uint32_t threads);
 
-// The host word that a download writes, before and after the host waits for the stream.
+// The values of a host word that a download writes: `before` and `after` the host waits for the
+// stream.
 struct DownloadedWord {
   uint32_t before = 0, after = 0;
 };

@@ -38,10 +38,10 @@ class DeviceMemory {
   // Ends all allocations.
   void reset();
 
-  // open() gives the host access for operations of a device, and close() revokes it. The
-  // instrumented sources of the backend check this state at every access. For all other code,
-  // close() must remove the access rights of the pages. Because that is slow, it does so in one of
-  // kCloseOneOf calls, at random.
+  // open() lets the host access the memory while it runs an operation of `device`; close() forbids
+  // it again. The instrumented sources of the backend check this state at every access. For all
+  // other code, close() must remove the access rights of the pages. Because that is slow, it does
+  // so in one of kCloseOneOf calls, at random.
   void open(int device);
   void close();
   bool is_open() const { return open_; }

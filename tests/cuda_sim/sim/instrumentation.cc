@@ -19,8 +19,8 @@ extern "C" char __executable_start, __data_start;
 namespace voxdag::cuda_sim {
 namespace {
 
-// True if a kernel's thread may access `p` without further checks: its own variables on the stack
-// of its fiber, the arguments of the launch, and (only reads) constants of the program.
+// True if a kernel's thread may access `p` without further checks. This holds for its own variables
+// on the stack of its fiber, the arguments of the launch, and, for reads, constants of the program.
 bool is_private(const void* p, Access access) {
   const char* at = static_cast<const char*>(p);
   const char* arguments = static_cast<const char*>(g_running.launch->arguments);

@@ -1,5 +1,5 @@
-// The functions of the CUDA runtime. Each of them takes the lock, fails if a failure is planned,
-// and otherwise first lets the schedule run some of the queued operations.
+// The functions of the CUDA runtime. Each of them takes device_lock(), fails if a failure is
+// planned, and otherwise first lets the schedule run some of the queued operations.
 #include <sys/mman.h>
 
 #include <cstring>

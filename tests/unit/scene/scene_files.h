@@ -164,7 +164,7 @@ inline std::vector<std::string> texts_of(const std::vector<Warning>& warnings) {
   return texts;
 }
 
-// Opens a scene file in memory.
+// A scene that is opened from a file in memory, with the objects that it needs.
 struct OpenScene {
   explicit OpenScene(std::string file, SceneOptions options = {},
                      uint64_t budget_bytes = uint64_t{64} << 20)

@@ -22,7 +22,8 @@ inline Json draco_extension(int view, Json attributes) {
            {{"bufferView", view}, {"attributes", std::move(attributes)}}}};
 }
 
-// Returns a scene with one compressed primitive.
+// Returns a scene with one primitive whose Draco data is `data`. `vertices` and `indices` are the
+// counts that its accessors declare.
 inline SceneBuilder compressed_scene(const std::vector<char>& data, uint64_t vertices,
                                      uint64_t indices, Json attributes = {{"POSITION", 0}}) {
   SceneBuilder scene;

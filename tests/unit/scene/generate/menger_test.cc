@@ -55,8 +55,8 @@ oracle::Voxels expected_voxels(uint32_t level, int resolution) {
   return voxels;
 }
 
-// There are 2 * 20^n + 4 * 8^n faces of two triangles each. No triangle is degenerate, and all
-// corners are integers.
+// A sponge of level n has 2 * 20^n + 4 * 8^n faces of two triangles each. No triangle is
+// degenerate, and the coordinates of all corners are integers.
 TEST(Menger, HasTheKnownNumberOfFaces) {
   for (uint32_t level = 0; level <= 3; ++level) {
     SCOPED_TRACE(level);

@@ -1,5 +1,5 @@
-// OBJ files made here: every form of a statement gives the triangles of the same mesh, and broken
-// files are refused with the line.
+// Reads OBJ files made by the tests. Every form of a statement gives the triangles of the same
+// mesh, and broken files are refused with an error that names the line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

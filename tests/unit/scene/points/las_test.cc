@@ -1,4 +1,4 @@
-// Reads LAS files made here: every version and point format, and broken files.
+// Reads LAS files made by the tests: every version and point format, and broken files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -106,7 +106,8 @@ TEST(TextPoints, Colors) {
   const Color white{65535, 65535, 65535, 65535};
   EXPECT_EQ(color_of("1 2 3 255 0 10\n"), (Color{65535, 0, light_in_text(10 / 255.0), 65535}));
   EXPECT_EQ(color_of("1 2 3 1.0 0 0.5\n"), (Color{65535, 0, light_in_text(0.5), 65535}));
-  // Without a decimal point, 1 means 1/255 of full intensity.
+  // Without a decimal point in any color, values are from 0 to 255, so 1 means 1/255 of full
+  // intensity.
   EXPECT_EQ(color_of("1 2 3 1 0 0\n"), (Color{light_in_text(1 / 255.0), 0, 0, 65535}));
   EXPECT_EQ(color_of("1 2 3 0.5 0 0\n1 2 3 2 0 0\n")[0], light_in_text(0.5 / 255));
   // Without column names, only the last three of exactly six columns can be colors, and only if

@@ -1,4 +1,4 @@
-// Reads STL files made here, binary and ASCII.
+// Reads binary and ASCII STL files made by the tests.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

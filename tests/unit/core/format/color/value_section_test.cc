@@ -27,8 +27,8 @@ class ValueSectionTest : public testing::Test {
     verify_global_file(*open_global_file(path), 2, budget, progress, {}, narrow_words);
   }
 
-  // Returns the value that the reader finds in a cell, as the number in the file; nullopt if the
-  // cell is not set.
+  // Returns the value that the reader finds in a cell, as the number that the file stores; nullopt
+  // if the cell is not set.
   static std::optional<uint32_t> value_in(const voxdag_reader::File& file, Attribute attribute,
                                           const uint32_t (&at)[3], uint32_t level) {
     uint64_t i;
