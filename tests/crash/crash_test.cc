@@ -72,7 +72,8 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   EXPECT_EQ(report.sha256, whole.sha256);
 }
 
-// If a read fails, the build does not treat the artifact as damaged, so it discards no artifact.
+// If reads fail, the build ends with an error. It does not treat an artifact that it cannot read as
+// damaged, so it discards no artifact.
 TEST_P(CrashTest, ReadsThatFail) {
   FaultyFiles counting({});
   run(counting);

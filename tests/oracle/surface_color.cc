@@ -22,7 +22,7 @@ SurfacePoint between(const SurfacePoint& a, const SurfacePoint& b, double part) 
   return out;
 }
 
-// Returns the part of the polygon with sign * coordinate <= sign * bound.
+// Returns the part of the polygon in which sign * at[axis] <= sign * bound.
 Polygon clipped(const Polygon& polygon, size_t axis, double bound, double sign) {
   Polygon out;
   for (size_t i = 0; i < polygon.size(); ++i) {

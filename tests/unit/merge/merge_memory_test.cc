@@ -51,8 +51,8 @@ TEST(MergeMemory, PassesGiveTheSameBytes) {
   }
 }
 
-// If the position map of a run exceeds the memory for maps, the run is rewired with one window of
-// the map after the other.
+// If the position map of a run exceeds the memory for maps, the run is rewired in several steps.
+// Each step loads a window (a range) of the map.
 TEST(MergeMemory, WindowsOfAMapGiveTheSameBytes) {
   const oracle::Voxels voxels = noise_voxels(3, 256);
   MergeHarness harness(8, 64);

@@ -1,4 +1,4 @@
-// Textures of small glTF scenes made here.
+// Reads the textures of small glTF scenes that the tests make.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -212,7 +212,7 @@ TEST(Attributes, AreThoseOfTheTriangles) {
   }
   size_t cells_seen = 0, turned_cells = 0, mixed_cells = 0;
   for (const oracle::SceneKind kind : oracle::kAllKinds) {
-    if (kind == oracle::SceneKind::kWide) continue;  // beyond the doubles of the oracle
+    if (kind == oracle::SceneKind::kWide) continue;  // BruteForce would overflow
     for (const ColorGrid grid : {ColorGrid{4, 4}, ColorGrid{6, 3}}) {
       SCOPED_TRACE(oracle::kind_name(kind) + " " + std::to_string(grid.levels));
       const oracle::Region whole{{0, 0, 0}, 1 << grid.levels};

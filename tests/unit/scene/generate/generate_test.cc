@@ -224,8 +224,8 @@ TEST(GenerateSoup, HoldsDegeneratesAndSlivers) {
   EXPECT_GT(wide, 5);
 }
 
-// A terrain is one connected sheet. It has as many triangles as the largest square that fits, and
-// neighboring tiles have equal heights where they meet.
+// A terrain is one connected, square sheet, the largest with at most the requested number of
+// triangles. Neighboring tiles have equal heights where they meet.
 TEST(GenerateTerrain, IsASquareWithoutGaps) {
   GenerateOptions options = small(SceneKind::kTerrain);
   options.triangles = 2 * 300 * 300 + 5;

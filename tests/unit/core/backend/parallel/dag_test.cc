@@ -87,8 +87,8 @@ TEST_F(ParallelDag, TheSweepRejectsCollisions) {
 }
 
 // Two different bricks have equal 4-bit hashes. Their parents differ only in these bricks, so the
-// parents' hashes are also equal. The construction drops one parent and never compares its brick.
-// Only the sweep over all octree nodes detects that the bricks differ.
+// parents' hashes are also equal. make_dag_by_hashes() keeps only one parent, so it never compares
+// the other parent's brick. Only the sweep over all octree nodes detects that the bricks differ.
 TEST_F(ParallelDag, TheSweepLooksAtDroppedNodes) {
   uint64_t one = 1, other = 2;
   while (truncate_hash(hash_brick(other), 4) != truncate_hash(hash_brick(one), 4)) ++other;

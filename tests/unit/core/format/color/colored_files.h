@@ -33,7 +33,7 @@ struct ColoredScene {
   Codes voxels;  // Morton codes, increasing
   SumOf sum_of;
 
-  // Returns the set cells of a level, in Morton order.
+  // Returns the Morton codes of a level's cells that contain voxels, in increasing order.
   Codes cells(uint32_t level) const {
     Codes codes;
     for (const uint64_t voxel : voxels)
@@ -92,7 +92,7 @@ inline Codes random_codes(uint64_t seed, uint32_t levels, int count) {
   return {codes.begin(), codes.end()};
 }
 
-// Returns the DAG of voxels in a grid that may be large.
+// Returns the DAG of voxels in a grid that may be too large for oracle::build_dag().
 inline oracle::Dag sparse_dag(const Codes& voxels, uint32_t levels) {
   oracle::Dag dag;
   if (voxels.empty()) return dag;
