@@ -60,9 +60,9 @@ TEST_F(ParallelDag, BothConstructionsAgreeAndAreInOrder) {
     }
 }
 
-// The hashes are so short that some octrees have different nodes with equal hashes. For such an
-// octree, make_dag_by_hashes() must return nothing, because its verification sweep finds the
-// collision. Every DAG that it returns must be right.
+// The hashes have only 6 to 13 bits, so some octrees have different nodes with equal hashes. Then
+// the verification sweep must find the collision, and make_dag_by_hashes() must return nothing.
+// Every DAG that it returns must be right.
 TEST_F(ParallelDag, TheSweepRejectsCollisions) {
   int accepted = 0, rejected = 0;
   for (uint64_t seed = 0; seed < 600; ++seed) {
