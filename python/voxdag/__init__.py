@@ -2,13 +2,13 @@
 
     report = voxdag.build("scene.glb", resolution=8192, output="scene.vdag")
     with voxdag.open("scene.vdag") as dag:
-        dag.lookup([[10, 20, 30]])              # is the voxel set?
-        dag.rays(origins, directions)           # the first voxel on each ray
-        dag.dense(region, level=8)              # a box of the grid with 2^8 cells per edge
+        dag.lookup([[10, 20, 30]])              # True for each voxel that is set
+        dag.rays(origins, directions)           # the first set voxel on each ray
+        dag.dense(region, level=8)              # a region of the grid with 2^8 cells per edge
 
 Long calls release the interpreter's lock, so other Python threads can run. build(), plan(),
-combine(), extract(), export() and render() stop on Ctrl-C. Errors of this package are
-`voxdag.Error`, with a `code`.
+combine(), extract(), export() and render() stop on Ctrl-C. If a function fails, it raises
+`voxdag.Error`, whose attribute `code` names the kind of the error.
 """
 
 from ._build import Scene, build, plan

@@ -1,5 +1,5 @@
-"""Converts meshes of other libraries to Mesh. Recognizes them by their attributes, so none of the
-libraries has to be installed."""
+"""Converts meshes of other libraries to Mesh. Recognizes these meshes by their attributes, so the
+libraries do not need to be installed."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ._mesh import Mesh
 
 
 class HasVertices(Protocol):
-    """Objects of trimesh and Open3D, and others with `faces` or `triangles`."""
+    """A mesh of trimesh or Open3D, or another object with `vertices` and `faces` or `triangles`."""
 
     @property
     def vertices(self) -> Any: ...
 
 
 class HasPoints(Protocol):
-    """Objects of PyVista and meshio, and clouds of points."""
+    """An object of PyVista or meshio, or a point cloud."""
 
     @property
     def points(self) -> Any: ...
@@ -72,7 +72,7 @@ def _of_trimesh_scene(scene: Any) -> list[Mesh]:
 
 
 def _of_vertices(mesh: Any) -> list[Mesh]:
-    """Converts objects with vertices and faces, or with vertices and triangles."""
+    """Converts an object with vertices and faces, or with vertices and triangles."""
     if hasattr(mesh, "entities"):  # paths of trimesh
         warn("lines make no voxels, and are left out")
         return []
@@ -120,8 +120,8 @@ def _texture_of(visual: Any) -> dict[str, Any]:
 
 
 def _of_open3d(mesh: Any, triangles: Any) -> list[Mesh]:
-    """Converts a TriangleMesh of Open3D, which can have a texture for each triangle. Its images
-    begin with their lower row."""
+    """Converts a TriangleMesh of Open3D, in which each triangle can have a different texture. The
+    images of its textures begin with the lower row."""
     vertices = np.asarray(mesh.vertices)
     textures = [np.asarray(texture) for texture in getattr(mesh, "textures", [])]
     uv = np.asarray(mesh.triangle_uvs).reshape(-1, 3, 2)
@@ -150,8 +150,9 @@ def _of_open3d_tensors(mesh: Any) -> list[Mesh]:
 
 
 def _of_pyvista(mesh: Any) -> list[Mesh]:
-    """Converts a PolyData. Its faces are one array: for each face, the number of its corners and
-    then the corners. Its cells are vertices, then lines, then faces."""
+    """Converts a PolyData of PyVista. Its array `faces` has, for each face, the number of corners
+    and then the corners. In its cell data, the rows of the faces follow the rows of the vertices
+    and lines."""
     points = np.asarray(mesh.points)
     faces = np.asarray(mesh.faces)
     if faces.ndim != 1:
@@ -167,7 +168,8 @@ def _of_pyvista(mesh: Any) -> list[Mesh]:
 
 
 def _pyvista_colors(data: Any, rows: int) -> Any:
-    """Returns the array of colors among the data of points or cells: uint8 with 3 or 4 columns."""
+    """Returns the first array of colors in `data`, the data of points or cells: an array of uint8
+    with 3 or 4 columns and this number of rows. Returns None if there is no such array."""
     for name in data.keys():  # noqa: SIM118 -- a DataSetAttributes, not a dict
         values = np.asarray(data[name])
         if values.dtype == np.uint8 and values.shape in ((rows, 3), (rows, 4)):
@@ -176,7 +178,8 @@ def _pyvista_colors(data: Any, rows: int) -> Any:
 
 
 def _triangles_of_padded(faces: Any) -> tuple[Any, Any]:
-    """Returns the triangles of fans, and the number of the face of each triangle."""
+    """Divides faces into fans of triangles. Returns the triangles, and for each triangle the index
+    of its face. `faces` has, for each face, the number of corners and then the corners."""
     if len(faces) % 4 == 0 and np.all(faces[::4] == 3):
         return faces.reshape(-1, 4)[:, 1:], np.arange(len(faces) // 4)
     triangles, face_of, at, face = [], [], 0, 0
@@ -233,7 +236,7 @@ def _of_points(cloud: Any) -> list[Mesh]:
 
 
 def _fans(faces: Any) -> Any:
-    """Returns the triangles of faces with equal numbers of corners."""
+    """Divides faces, an array with a row of corners for each face, into fans of triangles."""
     faces = np.asarray(faces)
     if faces.ndim != 2 or faces.shape[1] <= 3:
         return faces

@@ -11,8 +11,9 @@ from ._error import Error
 
 
 def rows_of(values: ArrayLike, dtype: DTypeLike, what: str) -> NDArray[Any]:
-    """Returns the argument `what` as a contiguous array (N, 3) of `dtype`. A single row x, y, z is
-    allowed. Raises Error for another shape, or for an array whose dtype must not be converted."""
+    """Converts the argument with the name `what` to a contiguous array (N, 3) of `dtype`. A single
+    row x, y, z is allowed. Raises Error for any other shape, for values that are not numbers, and
+    for floats if `dtype` is int64."""
     array = np.asarray(values)
     if array.ndim == 1 and array.shape == (3,):
         array = array.reshape(1, 3)

@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from ._types import Estimate
 
 _Item = Union[Path, IO[bytes], SceneObject]
-# A file, or an open binary file; an object with vertices and faces; or arrays: vertices, (N, 3)
-# numbers, and triangles, (M, 3) integers, the indexes of their three vertices. Or a sequence of
-# files and objects, which are one scene together.
+# A scene of build() and plan(): a path, an open binary file, a mesh, or a sequence of these, which
+# together form one scene. A mesh is a Mesh, an object of trimesh, Open3D, PyVista or meshio, or a
+# tuple (vertices, triangles) of arrays. build() describes these forms. A sequence cannot contain
+# such a tuple, but it can contain a Mesh with the same arrays.
 Scene = Union[_Item, tuple[ArrayLike, ArrayLike], Sequence[_Item]]
 
 
@@ -42,26 +43,33 @@ def build(
     progress: Progress = None,
     **options: Unpack[BuildOptions],
 ) -> BuildReport:
-    """Builds the DAG of a scene, or resumes an interrupted build, and returns its report.
+    """Builds the DAG of a scene, writes it to a .vdag file, and returns a report of the build.
 
-    scene             a file, or an open binary file such as io.BytesIO; a Mesh; an object of
-                      trimesh (Trimesh, Scene, PointCloud), Open3D (TriangleMesh, PointCloud),
-                      PyVista (PolyData and grids) or meshio (Mesh); a tuple of vertices (N, 3),
-                      which keep the precision of float32 or float64, and triangles (M, 3), the
-                      indexes of their vertices; or a list of files and objects, which are one
-                      scene together. Do not change arrays before build() returns. A LAZ file is
-                      decompressed to a temporary LAS file next to the output, which needs laspy
-                      and lazrs
-    resolution        voxels per edge of the grid, a power of two from 4 to 2^20; None: the
-                      smallest that fits `voxel_size`, which is then required
-    output            the .vdag file to write
-    progress          called with the stage's name, the number of units done, their total number
-                      (0 if unknown) and the unit's name, up to 20 times a second; if it raises an
-                      exception, build() cancels the build and raises the exception. True shows a
-                      bar of tqdm, or lines of text without tqdm
+    If a build is interrupted, the same call resumes it.
 
-    The report has the same names as the JSON of `voxdag build --json`. Raises Error. Further
-    options:
+    scene             a path, an open binary file, a mesh, or a list of these, which together form
+                      one scene
+    resolution        number of voxels per edge of the grid: a power of two from 4 to 2^20. Without
+                      it, the option `voxel_size` is required, and the resolution is the smallest
+                      that fits the scene.
+    output            path of the .vdag file to write
+    progress          a function that build() calls up to 20 times a second, or True to show a
+                      progress bar (see Progress). If the function raises an exception, build()
+                      cancels the build and raises this exception.
+
+    docs/scenes.md describes the formats of scene files. build() reads an open binary file, such as
+    io.BytesIO, into memory. A LAZ file requires the packages laspy and lazrs; build() decompresses
+    it to a temporary LAS file next to the output.
+
+    A mesh is a Mesh; an object of trimesh (Trimesh, Scene or PointCloud), Open3D (TriangleMesh or
+    PointCloud), PyVista (PolyData or a grid) or meshio (Mesh); or a tuple (vertices, triangles).
+    In the tuple, `vertices` is an array (N, 3) of numbers; float64 is not rounded to float32.
+    `triangles` is an array (M, 3) of integers: for each triangle, the indexes of its three
+    vertices. A list cannot contain such a tuple, but it can contain a Mesh with the same arrays.
+    Do not change the arrays before build() returns.
+
+    The report is a dict with the same members as the JSON object that `voxdag build --json` prints.
+    Raises Error if an argument is invalid or the build fails. Further options:
 
     """
     output = path_text(output)
@@ -81,9 +89,12 @@ def plan(
     progress: Progress = None,
     **options: Unpack[BuildOptions],
 ) -> Estimate:
-    """Estimates the cost of a build and creates no files. The arguments are the arguments of
-    build(); `output` is optional. The estimate has the same names as the JSON of
-    `voxdag plan --json`. Further options:
+    """Estimates the time, memory, disk space and file size of a build, without writing its output.
+
+    The arguments are the same as for build(), but `output` is optional. plan() decompresses LAZ
+    files to the system's folder for temporary files. The estimate is a dict with the same members
+    as the JSON object that `voxdag plan --json` prints. Raises Error if an argument is invalid or
+    the estimate fails. Further options:
 
     """
     output = "voxdag-plan" if output is None else path_text(output)
@@ -133,7 +144,7 @@ def _edge_of(resolution: SupportsIndex | None, options: BuildOptions) -> int:
 
 
 def _parts_of(scene: Any) -> tuple[list[str], list[IO[bytes]], list[Mesh]]:
-    """Returns the files, the open files and the meshes of a scene."""
+    """Returns three lists: the paths, the open files and the meshes of a scene."""
     if _is_pair_of_arrays(scene):
         return [], [], [Mesh(*scene)]
     paths: list[str] = []

@@ -11,8 +11,9 @@ from ._error import Error
 
 
 def byte_colors(given: ArrayLike, rows: int, what: str) -> NDArray[np.uint8]:
-    """Returns colors as (rows, 4) uint8. `given` has 3 or 4 channels: integers from 0 to 255, or
-    floats from 0 to 1. A single color stands for all rows. `what` names it in messages."""
+    """Converts colors to an array (rows, 4) of uint8. `given` has 3 or 4 channels: integers from 0
+    to 255, or floats from 0 to 1. It can be a single color for all rows. `what` is its name in
+    error messages."""
     colors = np.asarray(given)
     if colors.shape in ((3,), (4,)):
         colors = np.broadcast_to(colors, (rows, len(colors)))

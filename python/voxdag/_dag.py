@@ -30,50 +30,72 @@ _ATTRIBUTE_TYPES = {
 
 
 class Hits(NamedTuple):
-    """The hits of rays, one row per ray. A ray without a hit has an infinite distance."""
+    """The results of rays(): for each of N rays, the cell that it hits.
 
-    distance: Doubles  # (N,), in voxels; with world=True, in units of the scene
-    voxel: Integers  # (N, 3), the low corner of the hit cell in voxels; -1 without a hit
-    normal: NDArray[np.int8]  # (N, 3), of the hit face; 0 without a hit or if the ray began inside
+    distance  distance from the origin of each ray to its hit, as an array (N,) of float64. It is in
+              voxels, or with world=True in the units of the scene. It is infinite if the ray hits
+              no cell.
+    voxel     low corner of the hit cell, as an array (N, 3) of int64. It is always in voxels. It is
+              -1, -1, -1 if the ray hits no cell.
+    normal    unit normal of the face through which the ray enters the cell, as an array (N, 3) of
+              int8. It is 0, 0, 0 if the ray begins in the cell, or hits no cell.
+    """
+
+    distance: Doubles
+    voxel: Integers
+    normal: NDArray[np.int8]
 
     @property
     def hit(self) -> Bools:
-        """True for each ray with a hit, (N,) bool."""
+        """An array (N,) of bool that is True for each ray that hits a cell."""
         return np.isfinite(self.distance)
 
 
 def open(path: Path) -> Dag:
-    """Opens a .vdag file. The file is mapped into memory and read only where a query needs it, so
-    the time to open it does not depend on its size."""
+    """Opens a .vdag file and returns its Dag.
+
+    The file is mapped into memory and read only where a query needs it, so the time to open it does
+    not depend on its size. Raises Error if the file does not exist, cannot be read, or is not a
+    valid .vdag file."""
     return Dag(path)
 
 
 class Dag(DagFile):
-    """A finished file. Immutable; any number of threads may query it concurrently.
+    """An open .vdag file. A Dag is immutable, and several threads can query it concurrently.
 
-    The methods have these arguments in common:
+    These parameters have the same meaning in all methods:
 
-    points    positions of voxels, (N, 3) integers; with world=True, (N, 3) numbers
-    level     l: positions and regions are in cells of the coarser grid with 2^l cells per edge; a
-              cell is set if any voxel in it is set; by default, the cells are voxels
-    region    six numbers: the low corner x, y, z, which is in the region, and the high corner
-              x, y, z, which is not; it may extend beyond the grid; by default, the complete grid
-    world     True: positions, regions and distances are in world space, in the units of the scene
-    threads   number of threads; 0 means all cores
+    points    positions of cells, as an array (N, 3) of integers. With world=True, points in the
+              units of the scene, as an array (N, 3) of numbers. A single row x, y, z is allowed.
+    level     selects the grid of 2^level cells per edge. Positions and regions are then in cells of
+              this grid. A cell is set if any voxel in it is set. By default, the cells are the
+              voxels.
+    region    a box of cells, as six integers: x, y, z of the low corner, which is in the box, and
+              x, y, z of the high corner, which is not. The box may extend beyond the grid. The
+              default is the complete grid.
+    world     if True, points, regions and distances are in the units of the scene. A region then
+              contains all cells that it overlaps, and its coordinates may be infinite.
+    threads   number of threads, at most 1024; 0 means all cores
 
-    A Dag is also a set of voxels and an array of bool: `(x, y, z) in dag`, `len(dag)`,
-    `for x, y, z in dag`, `dag[x, y, z]`, `dag[10:20, :, 5]`, `np.asarray(dag)`. `a | b`, `a - b`,
-    `a & b` and `a ^ b` are new Dags in temporary files, as of combine(). A Dag is accepted wherever
-    a path is. pickle keeps the path and the digest; unpickling opens the file again and
-    raises Error if it changed. Two Dags are equal if their files have equal contents.
+    Methods raise Error if an argument is invalid, if the Dag is closed, or if they find that the
+    file is damaged.
+
+    A Dag also behaves like a set of voxels: `(x, y, z) in dag`, `len(dag)`, `for x, y, z in dag`.
+    And it behaves like the array that dense() returns: `dag[x, y, z]`, `dag[10:20, :, 5]`,
+    `np.asarray(dag)`.
+
+    `a | b`, `a - b`, `a & b` and `a ^ b` call combine() and return a Dag in a temporary file. Every
+    function that takes a path also takes a Dag. Two Dags are equal if their files have equal
+    contents. A pickled Dag contains the path and the digest of its file. Unpickling opens the file
+    again, and raises Error if its digest has changed.
     """
 
     def __len__(self) -> int:
         return self.voxels
 
     def __or__(self, other: Dag) -> Dag:
-        """Returns the voxels of this Dag or of the other one, in a temporary file. See
-        voxdag.combine()."""
+        """Returns a Dag in a temporary file. A voxel is set if it is set in this Dag or in the
+        other Dag. See voxdag.combine()."""
         return self._combined(other, "union") if isinstance(other, Dag) else NotImplemented
 
     def __sub__(self, other: Dag) -> Dag:
@@ -97,7 +119,7 @@ class Dag(DagFile):
         return bool(found[0])
 
     def __iter__(self) -> Iterator[Voxel]:
-        """Iterates over the set voxels, (x, y, z), in Morton order."""
+        """Iterates over the positions (x, y, z) of the set voxels, in Morton order."""
         return voxels_of(self)
 
     @overload
@@ -109,8 +131,8 @@ class Dag(DagFile):
     def __getitem__(self, key: Key) -> Bools: ...
 
     def __getitem__(self, key: Key) -> bool | Bools:
-        """Indexes the dense array [x, y, z] of the grid: returns a bool for three integers, and an
-        array if there is a slice. Reads only this part of the file."""
+        """Returns the part of the dense array [x, y, z] that `key` selects: a bool for three
+        integers, otherwise an array. Reads only this part of the file."""
         return element_of(self, key)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -133,7 +155,8 @@ class Dag(DagFile):
     def lookup(
         self, points: ArrayLike, level: int | None = None, *, world: bool = False, threads: int = 1
     ) -> Bools:
-        """Returns whether each voxel or cell is set, (N,) bool; False outside the grid."""
+        """Returns an array (N,) of bool that is True for each point whose cell is set. It is False
+        for points outside the grid."""
         positions = self._positions(points, level, world)
         found = np.empty(len(positions), np.bool_)
         self._dag.lookup(
@@ -151,12 +174,17 @@ class Dag(DagFile):
         world: bool = False,
         threads: int = 1,
     ) -> Hits:
-        """Returns the first set voxel on each ray. Origins and directions are (N, 3); one of them
-        may be a single row for all rays. Directions may have any length except 0.
+        """Finds the first set voxel on each ray, and returns Hits.
 
-        Set voxels farther than `max_distance` from the origin are not found. A ray stops at the
-        first set cell whose edge is at most `stop_size`, which is always in voxels: 1 stops at
-        single voxels.
+        `origins` and `directions` are arrays (N, 3) of numbers. If one of them has only one row,
+        this row applies to all rays. Origins and distances are in voxels, or with world=True in the
+        units of the scene. Directions may have any length except 0.
+
+        A ray finds only cells within `max_distance` of its origin. It stops at the first set cell
+        whose edge is at most `stop_size`. This size is always in voxels; with the default of 1,
+        rays stop at single voxels.
+
+        Raises Error if a coordinate is not finite, or if a direction is 0, 0, 0.
         """
         starts = rows_of(origins, np.float64, "origins")
         ways = rows_of(directions, np.float64, "directions")
@@ -182,8 +210,8 @@ class Dag(DagFile):
     def dense(
         self, region: Region | None = None, level: int | None = None, *, world: bool = False
     ) -> Bools:
-        """Returns the cells of a region as an array of bool: the element [x, y, z] is True if the
-        cell at the region's low corner + (x, y, z) is set."""
+        """Returns the cells of a region as an array of bool, whose shape is the size of the region.
+        Element [x, y, z] is True if the cell at the region's low corner + (x, y, z) is set."""
         low, high = self._region(region, level, world)
         cells = np.empty([max(0, b - a) for a, b in zip(low, high)], np.bool_)
         self._dag.dense(low, high, self._levels(level), cells.view(np.uint8))
@@ -217,11 +245,15 @@ class Dag(DagFile):
         world: bool = False,
         attributes: Sequence[str] | None = None,
     ) -> Any:
-        """Returns the set cells of a region in Morton order, (N, 3) int64.
+        """Returns the positions of the set cells in a region, in Morton order.
 
-        With world=True, returns their centers in the units of the scene, float64. With
-        `attributes`, such as ["color", "normal"], returns a tuple: the cells, and a dict with an
-        array for each attribute."""
+        The result is an array (N, 3) of int64. With world=True, it is an array (N, 3) of float64,
+        the centers of the cells in the units of the scene.
+
+        With `attributes`, a list of names such as ["color", "normal"], returns a tuple of this
+        array and a dict. For each name, the dict has an array with the values of the cells; its
+        shape and dtype are the same as in the results of colors(), alphas(), normals() and
+        materials(). Raises Error if the file does not have one of these attributes."""
         low, high = self._region(region, level, world)
         rows = self._dag.point_count(low, high, self._levels(level))
         found = np.empty((rows, 3), np.int64)
@@ -235,40 +267,45 @@ class Dag(DagFile):
 
     @property
     def attributes(self) -> list[str]:
-        """The names of the file's attributes: none, some or all of "color", "alpha", "normal" and
-        "material"."""
+        """A list of the names of the file's attributes. It has none, some or all of the names
+        "color", "alpha", "normal" and "material"."""
         return self._dag.attributes
 
     @property
     def material_names(self) -> list[str]:
-        """The names of the materials; materials() returns indexes of this list. The last name is ""
-        and stands for triangles without a material."""
+        """A list of the names of the materials. materials() returns indexes into this list. The
+        last name is "", for triangles without a material. The list is empty if the file has no
+        materials."""
         return [name.decode(errors="replace") for name in self._dag.material_names]
 
     def colors(self, points: ArrayLike, level: int | None = None, *, world: bool = False) -> Bytes:
-        """Returns the color of each cell, (N, 3) uint8, sRGB; 0 for a cell that is not set.
+        """Returns the color of each point's cell, as an array (N, 3) of uint8 in sRGB. The color of
+        a cell that is not set is 0, 0, 0.
 
-        The color grid is the finest grid with attributes. A smaller cell has the color of the color
-        grid's cell that contains it. Raises Error if the file has no colors. alphas(), normals()
-        and materials() follow the same rules."""
+        The finest grid for which the file stores colors is the color grid. A cell that is smaller
+        than the cells of the color grid has the color of the color cell that contains it. Raises
+        Error if the file has no colors.
+
+        alphas(), normals() and materials() follow the same rules for their attributes."""
         return self._values("color", points, level, world)
 
     def alphas(self, points: ArrayLike, level: int | None = None, *, world: bool = False) -> Bytes:
-        """Returns the alpha of each cell, (N,) uint8, linear; 0 for a cell that is not set."""
+        """Returns the alpha of each point's cell, as an array (N,) of uint8. Alpha is linear, and
+        255 is opaque. The alpha of a cell that is not set is 0."""
         return self._values("alpha", points, level, world)
 
     def normals(
         self, points: ArrayLike, level: int | None = None, *, world: bool = False
     ) -> NDArray[np.float32]:
-        """Returns the normal of each cell, (N, 3) float32, of length 1; 0 for a cell that is not
-        set."""
+        """Returns the normal of each point's cell, as an array (N, 3) of float32. Normals have the
+        length 1. The normal of a cell that is not set is 0, 0, 0."""
         return self._values("normal", points, level, world)
 
     def materials(
         self, points: ArrayLike, level: int | None = None, *, world: bool = False
     ) -> Integers:
-        """Returns the material of each cell, (N,) int64, an index into material_names; -1 for a
-        cell that is not set."""
+        """Returns the material of each point's cell, as an array (N,) of int64. A value is an index
+        into material_names, or -1 if the cell is not set."""
         return self._values("material", points, level, world)
 
     def count(
@@ -281,11 +318,15 @@ class Dag(DagFile):
     def nearest(
         self, points: ArrayLike, max_distance: float = np.inf, *, threads: int = 1
     ) -> tuple[Integers, Doubles]:
-        """Returns the set voxel nearest to each voxel, (N, 3) int64, and the distances between the
-        centers, (N,) float64, in voxels.
+        """Finds the set voxel that is nearest to each of the voxels `points`.
 
-        Among equally near voxels, returns the first in Morton order. If no set voxel is within
-        `max_distance`, the voxel is -1 and the distance is infinite."""
+        Returns a tuple of two arrays: the positions of the nearest voxels, (N, 3) of int64, and
+        their distances, (N,) of float64. A distance is measured in voxels, between the centers of
+        the two voxels. If several voxels are equally near, the result is the first of them in
+        Morton order. If no set voxel is within `max_distance` voxels, the position is -1, -1, -1
+        and the distance is infinite.
+
+        `points` may be outside the grid, with coordinates from -2^30 to 2^30."""
         positions = self._positions(points, None, False)
         voxels = np.empty_like(positions)
         distances = np.empty(len(positions))
@@ -293,37 +334,44 @@ class Dag(DagFile):
         return voxels, distances
 
     def bricks(self) -> Iterator[tuple[Voxel, BrickCells]]:
-        """Iterates over the bricks, the cubes of 4 x 4 x 4 voxels that have a set voxel, in Morton
-        order. Yields the low corner (x, y, z) of each brick, and its voxels: [x, y, z], bool."""
+        """Iterates over the bricks of the grid, in Morton order. A brick is a cube of 4 x 4 x 4
+        voxels with at least one set voxel; its low corner is at multiples of 4.
+
+        Yields a tuple for each brick: its low corner (x, y, z) in voxels, and its voxels as an
+        array [x, y, z] of bool with the shape (4, 4, 4)."""
         return bricks_of(self)
 
     def extract(self, output: Path, **options: Unpack[ExtractOptions]) -> ExtractReport:
-        """Writes a part of this file as a new .vdag file. It has the options of
-        voxdag.extract()."""
+        """Writes a region, or a coarser grid, of this file as a new .vdag file. Takes the options
+        of voxdag.extract() and returns its report."""
         from ._derive import extract
 
         return extract(self, output, **options)
 
     def export(self, output: Path, **options: Unpack[ExportOptions]) -> ExportReport:
-        """Writes this file, or a part of it, in the format of another program, which the ending of
-        `output` names. It has the options of voxdag.export()."""
+        """Writes this file, or a part of it, in the format of another program. Takes the options of
+        voxdag.export() and returns its report. Without `to`, the extension of `output` determines
+        the format."""
         from ._derive import export
 
         return export(self, output, **options)
 
     def render(self, **options: Unpack[RenderOptions]) -> Bytes:
-        """Renders a picture, (height, width, 3 or 4) uint8. It has the options of
-        voxdag.render()."""
+        """Renders a picture of this file, as an array (height, width, 3 or 4) of uint8. Takes the
+        options of voxdag.render()."""
         from ._render import render
 
         return render(self, **options)
 
     def view(self, *, open_browser: bool | None = None, program: str = "voxdag") -> Viewer:
-        """Starts the viewer of the program voxdag, and opens it in the browser. Returns a Viewer,
-        which has the `url`, and ends with close(), as a context manager, or with this program.
+        """Starts the viewer for this file, opens its page in the browser, and returns a Viewer.
 
-        open_browser   open the page; by default True, except in a notebook, which shows a link
-        program        the program voxdag, which the package does not contain
+        open_browser   True opens the page in the browser. The default is True, except in a
+                       notebook, where the Viewer is shown as a link.
+        program        name or path of the program voxdag, which is not part of this package
+
+        Keep the Viewer as long as you use the page: the viewer stops when the Viewer is no longer
+        referenced. Raises Error if the program does not exist or cannot start the viewer.
         """
         from ._notebook import view
 

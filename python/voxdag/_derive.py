@@ -1,5 +1,5 @@
-"""Makes files from finished .vdag files: extracts, set operations, and exports to formats of other
-programs."""
+"""Writes new files from .vdag files: extracts, results of set operations, and exports to the
+formats of other programs."""
 
 import json
 import os
@@ -31,21 +31,25 @@ def extract(
     force: bool = False,
     progress: Progress = None,
 ) -> ExtractReport:
-    """Writes a part of a .vdag file as a new .vdag file: a region, a coarser grid, or a region of a
-    coarser grid.
+    """Writes a part of a .vdag file as a new .vdag file, and returns a report. The part is a
+    region, a coarser grid, or a region of a coarser grid.
 
     path, output          the .vdag file to read, and the .vdag file to write
-    region, level, world  the part to write, as in Dag
-    crop                  make the smallest octree-aligned cube around the region the new grid
-    majority              set a cell of a coarser level if at least half of its voxels are set, not
-                          if any is; the volume of a solid hardly changes
-    memory                limit of the memory in bytes, or text such as "8GiB"; by default half of
-                          the machine's memory
+    region, level, world  select the part, as described in class Dag. The coarsest grid has 4 cells
+                          per edge (level 2).
+    crop                  if True, the grid of the new file is the smallest octree-aligned cube
+                          around the region. By default, the new file has the complete grid.
+    majority              if True, a cell of a coarser grid is set if at least half of its voxels
+                          are set. So the volume of a solid hardly changes. By default, a cell is
+                          set if any of its voxels is set.
+    memory                memory limit, as a number of bytes or as text such as "8GiB". The default
+                          is half of the machine's memory.
     threads               number of threads; 0 means all cores
-    force                 replace an existing output
+    force                 if True, replaces an existing output
     progress              as in build()
 
-    Returns counts, bounds and the SHA-256 of the new file. Raises Error.
+    Raises Error if an argument is invalid, if the selected part is outside the grid, if the output
+    exists, if the file has attributes and `majority` is True, or if the extract fails.
     """
     path, output = path_text(path), path_text(output)
     _check_output(path, [output], force)
@@ -82,20 +86,23 @@ def export(
     force: bool = False,
     progress: Progress = None,
 ) -> ExportReport:
-    """Writes a .vdag file, or a part of it, in the format of another program (docs/export.md).
+    """Writes a .vdag file, or a part of it, in the format of another program, and returns a report.
+    docs/export.md describes the formats.
 
-    path, output          the .vdag file to read, and the file to write
-    to                    the format, one of export_formats(); by default the ending of `output`
-                          names it, such as .ply or .vox
-    region, level, world  the part to write, as in Dag
-    memory                limit of the memory in bytes, or text such as "8GiB"; by default half of
-                          the machine's memory
-    gray                  leave out the colors that the file may have
-    force                 replace existing files
+    path, output          the .vdag file to read, and the file to write. Some formats write a second
+                          file next to `output`.
+    to                    name of the format, as in export_formats(). By default, the extension of
+                          `output`, such as .ply or .vox, determines the format.
+    region, level, world  select the part, as described in class Dag. The coarsest grid has 4 cells
+                          per edge (level 2).
+    memory                memory limit, as a number of bytes or as text such as "8GiB". The default
+                          is half of the machine's memory.
+    gray                  if True, omits the colors of the file
+    force                 if True, replaces existing files
     progress              as in build()
 
-    Returns a dict: "files", the written files; "bytes", their total size; "voxels", the number of
-    voxels; "notes", sentences on how to use the files. Raises Error.
+    Raises Error if an argument is invalid, if the selected part is outside the grid, if an output
+    exists, if the format cannot store the selected voxels, or if the export fails.
     """
     path, output = path_text(path), path_text(output)
     to = _format_of(output) if to is None else to
@@ -124,24 +131,29 @@ def combine(
     force: bool = False,
     progress: Progress = None,
 ) -> Dag:
-    """Writes the union, difference, intersection or symmetric difference of two .vdag files of the
-    same grid as a new .vdag file, and returns its Dag. `a | b`, `a - b`, `a & b` and `a ^ b` do the
-    same for two Dags.
+    """Combines two .vdag files into a new .vdag file, and returns its Dag. For two Dags, `a | b`,
+    `a - b`, `a & b` and `a ^ b` do the same.
 
-    a, b       .vdag files or Dags without colors and other attributes
-    operation  "union", "minus", "and" or "xor"
-    output     the .vdag file to write; by default a temporary file, which is removed when the Dag
-               is closed or no longer used
-    offset     the voxel of a's grid to which voxel 0, 0, 0 of b comes; then only the sizes of the
-               voxels must be equal
-    clip       drop the voxels that `offset` moves out of the grid; by default they are an error
-    memory     limit of the memory in bytes, or text such as "8GiB"; by default half of the
-               machine's memory
+    a, b       two .vdag files, as paths or Dags. Without `offset`, they must have the same grid.
+               They must have been built with the same `hash_bits`, and without colors and other
+               attributes.
+    operation  "union" sets the voxels that are set in `a` or in `b`, "minus" the voxels that are
+               set in `a` but not in `b`, "and" the voxels that are set in both files, and "xor"
+               the voxels that are set in exactly one of the files.
+    output     the .vdag file to write. By default it is a temporary file, which is removed when the
+               Dag is closed or no longer used.
+    offset     three integers. They move `b`, so that its voxel 0, 0, 0 comes to this voxel of the
+               grid of `a`. Then the grids may differ, but their voxels must have the same size.
+    clip       if True, drops the voxels of `b` that `offset` moves out of the grid of `a`. By
+               default, such voxels are an error.
+    memory     memory limit, as a number of bytes or as text such as "8GiB". The default is half of
+               the machine's memory.
     threads    number of threads; 0 means all cores
-    force      replace an existing output
+    force      if True, replaces an existing output
     progress   as in build()
 
-    Raises Error.
+    Raises Error if an argument is invalid, if `a` and `b` do not meet these conditions, if the
+    output exists, or if the operation fails.
     """
     paths = path_text(a), path_text(b)
     moved = None if offset is None else _voxel_of(offset)
@@ -168,12 +180,13 @@ def combine(
 
 
 def export_formats() -> dict[str, str]:
-    """Returns the names of the formats of export(), with a description of each."""
+    """Returns a dict from the name of each export format to its description. It has only the
+    formats whose libraries this copy of voxdag contains."""
     return {name: summary for name, summary, _ in _native.export_formats()}
 
 
 def _format_of(output: str) -> str:
-    """Returns the format that the ending of a file's name names."""
+    """Returns the name of the format whose extension the file name `output` has."""
     endings = {name: suffix or f".{name}" for name, _, suffix in _native.export_formats()}
     for name, ending in endings.items():
         if output.endswith(ending):

@@ -1,4 +1,5 @@
-"""The exceptions and warnings of this package, and checks of arguments of several functions."""
+"""The exceptions and warnings of this package, and checks of arguments that several functions
+share."""
 
 import errno
 import operator
@@ -13,14 +14,16 @@ _MAX_THREADS = 1024
 
 
 class Error(Exception):
-    """An error of this package. The text names the problem, the place and the expected value.
+    """The exception that the functions of this package raise. Its message names the problem, the
+    place of the problem and the expected value.
 
-    `code` is one of the names in docs/errors.md, such as "invalid_input", "corrupt" or "no_space".
-    The error is also an instance of the built-in exception for its code:
+    code   one of the names in docs/errors.md, such as "invalid_input", "corrupt" or "no_space"
+
+    For these codes, the error is also an instance of a built-in exception:
 
     invalid_input, limit   ValueError
     not_found              FileNotFoundError
-    io, no_space           OSError; PermissionError if the system denied the permission
+    io, no_space           OSError, or PermissionError if the system denied the permission
     out_of_memory          MemoryError
     device                 RuntimeError
     """

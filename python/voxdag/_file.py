@@ -35,13 +35,14 @@ class DagFile:
 
     @classmethod
     def _temporary(cls, path: str, folder: str) -> Self:
-        """Opens a file in a temporary folder, which is removed when the Dag is closed."""
+        """Opens the file `path` in the temporary folder `folder`. The folder is removed when the
+        Dag is closed or no longer used."""
         dag = cls(path)
         dag._remove = weakref.finalize(dag, shutil.rmtree, folder, True)
         return dag
 
     def close(self) -> None:
-        """Closes the file. Later queries raise Error."""
+        """Closes the file, and removes it if it is a temporary file. Later queries raise Error."""
         self._file = None
         if self._remove is not None:
             self._remove()
@@ -62,8 +63,9 @@ class DagFile:
 
     @property
     def digest(self) -> str:
-        """Identifies the contents of the file: the SHA-256 of its header, which has checksums of
-        all other bytes. Hexadecimal; not the SHA-256 of the file."""
+        """A hexadecimal number that identifies the contents of the file. It is the SHA-256 of the
+        file's header, which contains checksums of all other bytes. So it differs from the SHA-256
+        of the file."""
         return self._digest
 
     def __eq__(self, other: object) -> bool:
@@ -83,46 +85,55 @@ class DagFile:
 
     @property
     def resolution(self) -> int:
-        """Voxels per edge of the grid."""
+        """The number of voxels per edge of the grid."""
         return 1 << self._dag.grid_levels
 
     @property
     def voxels(self) -> int:
-        """Total number of set voxels."""
+        """The total number of set voxels."""
         return self._dag.voxels
 
     @property
     def voxel_size(self) -> float:
-        """The edge of a voxel, in the units of the scene."""
+        """The length of a voxel's edge, in the units of the scene."""
         return self._dag.edge / self.resolution
 
     @property
     def bounds(self) -> Doubles:
-        """The low and the high corner of the grid in the units of the scene, (2, 3) float64."""
+        """The low and the high corner of the grid in the units of the scene, as an array (2, 3) of
+        float64."""
         low = np.array(self._dag.origin)
         return np.stack([low, low + self._dag.edge])
 
     @property
     def levels(self) -> list[Level]:
-        """A dict with "level", "nodes" and "bytes" for each level of the DAG, from the root's level
-        to the level of the bricks, which are nodes of 4 x 4 x 4 voxels."""
+        """A list with a dict for each level of the DAG. "level" is the number of the level, "nodes"
+        is the number of its nodes, and "bytes" is their size in the file. The list begins with the
+        root, at level 0. It ends with the bricks, which are nodes of 4 x 4 x 4 voxels."""
         return [
             {"level": level, "nodes": nodes, "bytes": size}
             for level, (nodes, size) in enumerate(self._dag.levels())
         ]
 
     def to_world(self, positions: ArrayLike, level: int | None = None) -> Doubles:
-        """Converts positions in the grid to positions in the scene, float64. `positions` may have
-        fractions: v is the low corner of voxel v, and v + 0.5 its center."""
+        """Converts positions in the grid to points in the units of the scene.
+
+        `positions` has the shape (..., 3) and is in voxels, or in cells of the grid that `level`
+        selects. It may have fractions: v is the low corner of voxel v, and v + 0.5 is its center.
+        The result is an array of float64 with the same shape."""
         size = self._dag.edge / (1 << self._levels(level))
         return np.asarray(self._dag.origin) + np.asarray(positions, np.float64) * size
 
     def to_voxel(self, points: ArrayLike, level: int | None = None) -> Integers:
-        """Returns the voxel or cell that contains each point of the scene, int64 in the shape of
-        `points`. It may be outside the grid.
+        """Returns the position of the voxel that contains each point. With `level`, returns the
+        position of the cell of this level.
 
-        to_voxel(to_world(v)) is v for integer positions v: errors from the rounding of doubles are
-        corrected."""
+        `points` has the shape (..., 3) and is in the units of the scene. The result is an array of
+        int64 with the same shape. Positions can be outside the grid. Raises Error if a coordinate
+        is not finite.
+
+        If a point differs from a cell boundary only by rounding, it counts as on the boundary. So
+        to_voxel(to_world(v)) is v for all integer positions v."""
         values = np.asarray(points, np.float64)
         if values.ndim == 0 or values.shape[-1] != 3:
             raise Error(

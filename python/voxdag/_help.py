@@ -8,8 +8,8 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def lists_options(options: type) -> Callable[[_Function], _Function]:
-    """Appends the generated list of options, in the documentation of `options`, to the
-    documentation of a function."""
+    """Returns a decorator that appends the list of options in the docstring of `options` to the
+    docstring of a function."""
 
     def decorate(function: _Function) -> _Function:
         listed = (options.__doc__ or "").partition("\n\n")[2]

@@ -1,4 +1,4 @@
-"""A Dag as an array of bool, and as a set of voxels."""
+"""Indexes a Dag like an array of bool, and iterates over its voxels and bricks."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ def element_of(dag: Dag, key: Any) -> bool | NDArray[np.bool_]:
 
 
 def _three_items(key: tuple[Any, ...]) -> list[Any]:
-    """Returns an item for each axis. An ellipsis, and missing items, stand for all positions."""
+    """Returns an item for each axis. Replaces an ellipsis and missing items by slices of the
+    complete axis."""
     ellipses = [place for place, item in enumerate(key) if item is Ellipsis]
     if len(ellipses) > 1 or len(key) - len(ellipses) > 3:
         raise IndexError(f"the index {key!r}: expected at most three items and one ellipsis")
@@ -66,7 +67,8 @@ def _single(item: Any, resolution: int, axis: int) -> range:
 
 
 def _slice_of(chosen: range, begin: int) -> slice:
-    """Returns the slice that selects the positions from a block that begins at `begin`."""
+    """Returns the slice that selects the positions `chosen` from an array whose first element is at
+    the position `begin`."""
     if not chosen:
         return slice(0, 0)
     end = chosen[-1] - begin + (1 if chosen.step > 0 else -1)
@@ -92,7 +94,7 @@ def bricks_of(dag: Dag) -> Iterator[tuple[Voxel, BrickCells]]:
 
 
 def _blocks_of(dag: Dag) -> Iterator[tuple[Voxel, Voxel]]:
-    """Yields the low and high corners of the blocks with set voxels, in Morton order."""
+    """Yields the low and the high corner of each block that has set voxels, in Morton order."""
     levels = dag.resolution.bit_length() - 1
     edge = 1 << min(levels, _BLOCK_LEVELS)
     for x, y, z in (dag.points(level=max(0, levels - _BLOCK_LEVELS)) * edge).tolist():

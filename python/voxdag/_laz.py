@@ -19,8 +19,9 @@ _COMPRESSED = 0xC0
 
 @contextlib.contextmanager
 def decompressed(files: Sequence[str], folder_prefix: str) -> Iterator[list[str]]:
-    """Replaces the LAZ files of a list by temporary LAS files, which have the names
-    `folder_prefix` + "0.las", ..., so that a repeated build has the same files."""
+    """Provides the list `files`, in which temporary LAS files replace the LAZ files. Removes the
+    temporary files at the end. File number i has the name `folder_prefix` + "i.las", so that a
+    repeated build finds files with the same names."""
     temporary: list[str] = []
     try:
         yield [_las_of(file, f"{folder_prefix}{i}.las", temporary) for i, file in enumerate(files)]

@@ -31,19 +31,23 @@ _NO_VERTEX = 0xFFFFFFFF
 
 @dataclass(frozen=True)
 class Mesh:
-    """A triangle mesh in memory, as a scene of build() and plan().
+    """A mesh of triangles, or a point cloud, in memory. build() and plan() take it as a scene.
 
-    vertices      (N, 3) numbers; float64 is not rounded to float32
-    triangles     (M, 3) integers, the indexes of the vertices; None or (0, 3): the vertices are
-                  points, each of which sets one voxel
-    colors        (N, 3) or (N, 4), a color for each vertex: uint8, or floats from 0 to 1, in sRGB;
-                  alpha is linear
-    face_colors   the same for each triangle; not together with `colors`
-    uv            texture coordinates: (N, 2) for each vertex, or (M, 3, 2) for each corner of the
-                  triangles; v is 0 at the lower edge of the image
-    texture       the image: an array (height, width, 3 or 4) of uint8 with the upper row first, an
-                  object that numpy converts to such an array (a Pillow image), or the bytes of a
-                  PNG, JPEG or WebP file. A mesh with a texture has only the colors of the texture
+    vertices      array (N, 3) of numbers: the positions of the vertices. float64 is not rounded to
+                  float32.
+    triangles     array (M, 3) of integers: for each triangle, the indexes of its three vertices. If
+                  it is None or has no rows, the vertices are points. Each point sets one voxel,
+                  unless the option `point_radius` is given.
+    colors        array (N, 3) or (N, 4): red, green, blue and optionally alpha of each vertex, as
+                  integers from 0 to 255 or floats from 0 to 1. Colors are in sRGB; alpha is linear.
+    face_colors   array (M, 3) or (M, 4): the color of each triangle, in the same form. A mesh
+                  cannot have both `colors` and `face_colors`.
+    uv            texture coordinates: an array (N, 2) for the vertices, or (M, 3, 2) for the
+                  corners of the triangles. The coordinate v is 0 at the lower edge of the image.
+    texture       an image: an array (height, width, 3 or 4) of uint8 with the upper row first, an
+                  object that numpy converts to such an array (such as a Pillow image), or the bytes
+                  of a PNG, JPEG or WebP file. A mesh with `uv` and `texture` has only the colors of
+                  the texture.
     material      name of the texture's material
     name          name of the mesh in messages
 
@@ -64,9 +68,9 @@ class Mesh:
 def native_meshes(
     meshes: Sequence[Mesh], with_colors: bool, skip_invalid: bool
 ) -> list[NativeMesh]:
-    """Checks meshes. Returns them with the types that the native module requires. Colors and
-    textures are left out unless `with_colors` is True; invalid triangles remain, for the native
-    module to drop, if `skip_invalid` is True."""
+    """Checks meshes, and converts them to the types that the native module requires. Omits colors
+    and textures unless `with_colors` is True. Raises Error for an invalid triangle. If
+    `skip_invalid` is True, keeps invalid triangles instead, and the native module drops them."""
     textures = _TextureNames()
     names: set[str] = set()
     return [
@@ -76,7 +80,7 @@ def native_meshes(
 
 
 def _path_of(name: str, taken: set[str]) -> str:
-    """Returns a unique path for a mesh. Adds it to the paths that are taken."""
+    """Returns a path for the mesh `name` that is not in `taken`, and adds it to `taken`."""
     path = f"mesh {_plain(name)!r}" if name else "mesh in memory"
     stem, number = path, 1
     while path in taken:
@@ -87,7 +91,8 @@ def _path_of(name: str, taken: set[str]) -> str:
 
 
 def _plain(name: str) -> str:
-    """Returns a name without the characters that have a meaning in paths and headers of files."""
+    """Returns `name` with at most 100 characters. Replaces characters that have a special meaning
+    in paths and in file headers."""
     plain = "".join("_" if c in '/\\:"' or not c.isprintable() else c for c in name)
     return plain.encode(errors="replace").decode().strip()[:100]
 
@@ -183,7 +188,8 @@ def _checked_triangles(
 
 
 def _refuse_infinite(vertices: NDArray[Any], triangles: NDArray[np.uint32], where: str) -> None:
-    """Raises Error for the first triangle, or point, that has a position that is not finite."""
+    """Raises Error if a vertex of a triangle is not finite. Without triangles, checks all
+    vertices."""
     if len(vertices) == 0 or (np.isfinite(vertices.min()) and np.isfinite(vertices.max())):
         return
     is_bad = ~np.isfinite(vertices).all(axis=1)
@@ -226,7 +232,8 @@ def _checked_uv(given: ArrayLike, vertices: int, triangles: int, where: str) -> 
 def _with_own_corners(
     vertices: NDArray[Any], triangles: NDArray[np.uint32]
 ) -> tuple[NDArray[Any], NDArray[np.uint32]]:
-    """Returns the same triangles, of which none has a vertex in common with another one."""
+    """Returns the vertices and indexes of the same triangles, with three separate vertices for
+    each triangle."""
     exists = triangles < len(vertices)
     corners = vertices[np.where(exists, triangles, 0)].reshape(-1, 3)
     own = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)

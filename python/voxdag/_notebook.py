@@ -24,12 +24,12 @@ _SIZE = (384, 216)
 
 
 def picture_of(dag: Dag) -> bytes:
-    """Returns a small picture as a PNG file."""
+    """Returns the bytes of a PNG file with a small picture of the voxels."""
     return png_of(render(dag, size=_SIZE))
 
 
 def html_of(dag: Dag) -> str:
-    """Returns the properties of a file and a small picture."""
+    """Returns HTML with a small picture of the voxels and a table of the file's properties."""
     picture = dag._repr_png_()
     if picture is None:
         return f"<code>{html.escape(repr(dag))}</code>"
@@ -53,8 +53,13 @@ def html_of(dag: Dag) -> str:
 
 
 class Viewer:
-    """The viewer of a Dag, until close() or the end of the program. `url` is its address, which
-    only programs on this machine can open. In a notebook, it is shown as a link with a picture."""
+    """A running viewer of a Dag. Dag.view() starts it.
+
+    url   address of the viewer's page, which only programs on this machine can open
+
+    A notebook shows a Viewer as a link with a picture. The viewer stops when close() is called,
+    when its `with` block ends, when the Viewer is no longer referenced, or when this Python process
+    ends."""
 
     url: str
 
@@ -83,7 +88,7 @@ class Viewer:
         self.url = json.loads(line)["url"]
 
     def close(self) -> None:
-        """Ends the viewer."""
+        """Stops the viewer."""
         self._stop()
 
     def __enter__(self) -> Self:

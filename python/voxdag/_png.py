@@ -12,7 +12,7 @@ _COLOR_TYPES = {3: 2, 4: 6}
 
 
 def png_of(pixels: NDArray[np.uint8]) -> bytes:
-    """Returns a PNG file of an array (height, width, 3 or 4), in sRGB."""
+    """Returns the bytes of a PNG file. `pixels` is an array (height, width, 3 or 4) in sRGB."""
     height, width, channels = pixels.shape
     header = struct.pack(">IIBBBBB", width, height, 8, _COLOR_TYPES[channels], 0, 0, 0)
     rows = np.zeros((height, 1 + width * channels), np.uint8)  # each row begins with its filter, 0

@@ -9,9 +9,12 @@ import time
 from collections.abc import Iterator
 from typing import Any, Callable, Union
 
-# A function that is called with the stage's name, the number of units done, the total number of
-# units (0 if unknown) and the unit's name, such as "triangles". True shows a bar of tqdm, or lines
-# of text if tqdm is not installed. None and False show nothing.
+# The argument `progress` of long calls: a function, True, False or None. A function is called as
+# progress(stage, done, total, unit) up to 20 times a second, on the thread of the caller. `stage`
+# is the name of the current stage. `done` is the number of finished units, `total` is the number of
+# all units (0 if unknown), and `unit` is the name of the units, such as "triangles". If the
+# function raises an exception, the call stops and raises this exception. True shows a progress bar
+# of tqdm, or prints lines to standard error if tqdm is not installed. False and None show nothing.
 Progress = Union[Callable[[str, int, int, str], None], bool, None]
 _Function = Callable[[str, int, int, str], None]
 
@@ -20,7 +23,8 @@ _TEXT_INTERVAL_S = 1.0
 
 @contextlib.contextmanager
 def shown(progress: Progress) -> Iterator[_Function | None]:
-    """Provides the function that receives the progress of a call."""
+    """Provides the function that receives the progress of a call, or None if the call reports no
+    progress. Closes the progress bar at the end."""
     if progress is None or progress is False:
         yield None
     elif progress is True:
@@ -43,7 +47,7 @@ def _bar() -> _TqdmBars | _TextLines:
 
 
 class _TqdmBars:
-    """A bar for each stage."""
+    """Shows a tqdm progress bar for each stage."""
 
     def __init__(self, tqdm: Any) -> None:
         self._tqdm = tqdm
@@ -65,7 +69,7 @@ class _TqdmBars:
 
 
 class _TextLines:
-    """A line for each stage, and for each second of a long stage, on standard error."""
+    """Prints a line to standard error when a stage begins, and every second during a stage."""
 
     def __init__(self) -> None:
         self._stage = ""

@@ -30,25 +30,32 @@ def render(
     threads: int = 0,
     progress: Progress = None,
 ) -> Bytes:
-    """Renders the same picture as `voxdag render`. Returns it as (height, width, 3) uint8, sRGB,
-    or with a transparent background as (height, width, 4), where the last channel is alpha.
+    """Renders the picture that the command `voxdag render` writes, and returns its pixels.
 
-    view             auto, iso, front, back, left, right, top or inside
-    camera, target   the camera's position and a point that it looks at, in the units of the
-                     scene; used instead of a view
-    fov              vertical field of view, 1 to 170 degrees; by default chosen by the view, or
-                     50 degrees with a camera
-    size             width and height in pixels
-    samples          N: N * N samples per pixel, 1 to 8
-    background       what pixels without a surface show: "sky", "white" or "transparent"
-    gray             leave out the colors that the file may have
-    memory           limit of the memory in bytes, or text such as "8GiB"; by default half of the
-                     machine's memory. A picture takes about 66 bytes per pixel; if this exceeds
-                     the limit, render() raises Error
-    threads          number of threads; 0 means all cores; the pixels do not depend on it
+    The result is an array (height, width, 3) of uint8: red, green and blue in sRGB, with the upper
+    row first. With a transparent background, its shape is (height, width, 4), and the last channel
+    is alpha.
+
+    view             name of the camera's view: "auto", "iso", "front", "back", "left", "right",
+                     "top" or "inside". "auto" is "inside" if most of the scene cannot be seen from
+                     outside, otherwise "iso".
+    camera, target   position of the camera and of the point at the center of the picture, each as
+                     x, y, z in the units of the scene. They replace the view.
+    fov              vertical field of view, from 1 to 170 degrees. The default depends on the view;
+                     with a camera, it is 50 degrees.
+    size             width and height in pixels, each at most 16384
+    samples          number of samples along each edge of a pixel, from 1 to 8. A pixel is the mean
+                     of samples * samples samples.
+    background       color of pixels that show no surface: "sky", "white" or "transparent"
+    gray             if True, ignores the colors of the file
+    memory           memory limit, as a number of bytes or as text such as "8GiB". The default is
+                     half of the machine's memory. A picture needs 66 bytes per pixel, or 68 with a
+                     transparent background.
+    threads          number of threads; 0 means all cores. The pixels do not depend on it.
     progress         as in build()
 
-    Raises Error.
+    Raises Error if an argument is invalid, if the picture needs more than `memory`, or if the file
+    cannot be read.
     """
     width, height = _size(size)
     if (camera is None) != (target is None):
@@ -94,7 +101,7 @@ def render(
 
 
 def _number(value: Any) -> float:
-    """Returns the value as a float; NaN if it is not a number."""
+    """Returns the value as a float, or NaN if it is not a number."""
     try:
         return float(value) if np.ndim(value) == 0 and not isinstance(value, str) else math.nan
     except (TypeError, ValueError, OverflowError):

@@ -13,13 +13,13 @@ from ._progress import Progress
 if TYPE_CHECKING:
     from typing_extensions import NotRequired
 
-# Six numbers: the low corner x, y, z, which is in the region, and the high corner x, y, z, which is
-# not.
+# A box of cells: a sequence or an array of six numbers. The first three are x, y, z of the low
+# corner, which is in the region. The last three are x, y, z of the high corner, which is not.
 Region = Union[Sequence[Any], NDArray[Any]]
 
 
 class Range(TypedDict):
-    """An estimated number."""
+    """An estimated number: its most likely value, and a low and a high estimate."""
 
     low: float
     likely: float
@@ -27,7 +27,7 @@ class Range(TypedDict):
 
 
 class ColorEstimate(TypedDict):
-    """The part of an estimate for colors and other attributes."""
+    """The estimate for the colors and other attributes alone, without the voxels."""
 
     cells: Range
     file_bytes: Range
@@ -46,7 +46,7 @@ class SceneWarning(TypedDict):
 
 
 class SolidEstimate(TypedDict):
-    """The part of an estimate for a solid's interior."""
+    """The estimate for the interior of a solid."""
 
     rule: str
     interior: Range
@@ -58,7 +58,8 @@ class SolidEstimate(TypedDict):
 
 
 class Estimate(TypedDict):
-    """The result of plan(). docs/cli.md (The estimate of plan) explains the members."""
+    """The dict that plan() returns. docs/cli.md, section "The estimate of plan", describes its
+    members. A Range is a dict with the members "low", "likely" and "high"."""
 
     triangles: int
     subvolumes: int
@@ -78,14 +79,24 @@ class Estimate(TypedDict):
 
 
 class Bounds(TypedDict):
-    """The cube of a grid: its low corner and its edge."""
+    """The cube that a grid covers: its low corner and the length of its edge, in scene units."""
 
     origin: list[float]
     edge: float
 
 
 class ExtractReport(TypedDict):
-    """The report of extract()."""
+    """The dict that extract() returns. It describes the new file.
+
+    resolution   number of voxels per edge of the grid
+    bounds       a dict with the low corner of the grid, "origin", and the length of the grid's
+                 edge, "edge", in the units of the scene
+    voxels       number of set voxels
+    svo_nodes    number of nodes of the octree, without sharing of equal subtrees
+    dag_nodes    number of nodes of the DAG
+    bytes        size of the file in bytes
+    sha256       SHA-256 of the file, as a hexadecimal number
+    """
 
     resolution: int
     bounds: Bounds
@@ -97,8 +108,13 @@ class ExtractReport(TypedDict):
 
 
 class ExportReport(TypedDict):
-    """The report of export(): the written files and their total size, the number of voxels, and
-    sentences on how to use the files."""
+    """The dict that export() returns.
+
+    files    list of the paths of the written files
+    bytes    total size of the files in bytes
+    voxels   number of exported voxels
+    notes    list of sentences on how to use the files
+    """
 
     files: list[str]
     bytes: int
@@ -150,7 +166,8 @@ class RenderOptions(TypedDict, total=False):
 
 
 class Level(TypedDict):
-    """A level of the DAG: its number, 0 for the root, its nodes and their size in the file."""
+    """A level of the DAG: the number of the level (0 for the root), the number of its nodes, and
+    their size in the file."""
 
     level: int
     nodes: int

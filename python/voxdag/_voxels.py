@@ -37,21 +37,24 @@ def from_points(
     progress: Progress = None,
     **options: Unpack[VoxelOptions],
 ) -> Dag:
-    """Sets the voxels that contain points, and returns the DAG.
+    """Builds a DAG in which the voxels that contain points are set, and returns its Dag.
 
-    points       (N, 3) numbers
-    voxel_size   edge of a voxel, in the units of the points
-    colors       (N, 3) or (N, 4), uint8 or floats from 0 to 1: the colors of the points; a voxel
-                 has the mean color of its points
-    origin       the low corner of the grid; by default the largest multiples of voxel_size that
-                 are not above any point. A point p is in the voxel
-                 floor((p - origin) / voxel_size)
-    resolution   voxels per edge of the grid, a power of two; by default the smallest that fits
-    output       the .vdag file to write; by default a temporary file, which is removed when the Dag
-                 is closed or no longer used
+    points       array (N, 3) of numbers. The point p sets the voxel
+                 floor((p - origin) / voxel_size).
+    voxel_size   length of a voxel's edge, in the units of the points
+    colors       array (N, 3) or (N, 4): red, green, blue and optionally alpha of each point, as
+                 integers from 0 to 255 or floats from 0 to 1. Colors are in sRGB. A voxel has the
+                 mean color of its points, in linear light.
+    origin       low corner of the grid, as x, y, z. By default, each of its coordinates is the
+                 largest multiple of voxel_size that is not above any point.
+    resolution   number of voxels per edge of the grid, a power of two from 4 to 2^20. The default
+                 is the smallest that fits.
+    output       the .vdag file to write. By default it is a temporary file, which is removed when
+                 the Dag is closed or no longer used.
     progress     as in build()
 
-    Raises Error. Further options:
+    Raises Error if a point is not finite or outside the grid, if another argument is invalid, or if
+    the build fails. Further options:
 
     """
     positions = _points_of(points)
@@ -86,18 +89,21 @@ def from_voxels(
     progress: Progress = None,
     **options: Unpack[VoxelOptions],
 ) -> Dag:
-    """Sets exactly these voxels, and returns the DAG.
+    """Builds a DAG in which exactly the given voxels are set, and returns its Dag.
 
-    voxels       (N, 3) integers, at least 0; the same voxel may occur several times
-    colors       (N, 3) or (N, 4), uint8 or floats from 0 to 1: the colors of the voxels
-    resolution   voxels per edge of the grid, a power of two; by default the smallest that fits
-    voxel_size   edge of a voxel, in the units of the scene
-    origin       the low corner of the grid, in the units of the scene
-    output       the .vdag file to write; by default a temporary file, which is removed when the Dag
-                 is closed or no longer used
+    voxels       array (N, 3) of integers from 0 to 2^20 - 1: the positions of the voxels. The same
+                 position may occur several times.
+    colors       array (N, 3) or (N, 4): red, green, blue and optionally alpha of each voxel, as
+                 integers from 0 to 255 or floats from 0 to 1. Colors are in sRGB.
+    resolution   number of voxels per edge of the grid, a power of two from 4 to 2^20. The default
+                 is the smallest that fits.
+    voxel_size   length of a voxel's edge, in the units of the scene
+    origin       low corner of the grid, as x, y, z in the units of the scene
+    output       the .vdag file to write. By default it is a temporary file, which is removed when
+                 the Dag is closed or no longer used.
     progress     as in build()
 
-    Raises Error. Further options:
+    Raises Error if an argument is invalid or the build fails. Further options:
 
     """
     cells = np.asarray(voxels)
@@ -124,13 +130,16 @@ def from_dense(
     progress: Progress = None,
     **options: Unpack[VoxelOptions],
 ) -> Dag:
-    """Sets the voxels that are not 0 in an array [x, y, z], and returns the DAG.
+    """Builds a DAG from a dense array of voxels, and returns its Dag.
 
-    array        (X, Y, Z) of bool or numbers; the voxel (x, y, z) is set if array[x, y, z] is not 0
-    colors       (X, Y, Z, 3) or (X, Y, Z, 4), uint8 or floats from 0 to 1
+    array        array (X, Y, Z) of bool or numbers. The voxel (x, y, z) is set if array[x, y, z] is
+                 not 0.
+    colors       array (X, Y, Z, 3) or (X, Y, Z, 4): the colors of the voxels, in the same form as
+                 for from_voxels()
 
-    The other arguments are the arguments of from_voxels(). Dag.dense() is the inverse. Raises
-    Error.
+    The other arguments are the same as for from_voxels(). Dag.dense() is the inverse of this
+    function, except that its array has the size of the grid. Raises Error if an argument is invalid
+    or the build fails.
     """
     dense = np.asarray(array)
     if dense.ndim != 3:
@@ -187,7 +196,8 @@ def _origin_of(origin: ArrayLike) -> NDArray[np.float64]:
 
 
 def _resolution_of(cells: NDArray[Any], given: SupportsIndex | None) -> int:
-    """Returns the voxels per edge of a grid that contains the cells."""
+    """Returns the number of voxels per edge of the grid: `given`, or by default the smallest that
+    contains all cells. Raises Error if a cell is outside this grid."""
     if len(cells) and (cells.min() < 0 or cells.max() >= _MAX_RESOLUTION):
         bad = np.flatnonzero(((cells < 0) | (cells >= _MAX_RESOLUTION)).any(axis=1))[0]
         raise Error(
@@ -217,7 +227,8 @@ def _dag_of(
     progress: Progress,
     options: VoxelOptions,
 ) -> Dag:
-    """Builds a grid in which these cells are set: a point in the center of each cell."""
+    """Builds a DAG in which `cells` are set. The scene of the build has a point in the center of
+    each cell."""
     for name in options:
         if name not in VoxelOptions.__annotations__:
             raise TypeError(f"unexpected keyword argument {name!r}")
