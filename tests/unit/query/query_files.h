@@ -10,7 +10,7 @@
 #include "tests/unit/core/format/test_files.h"
 #include "voxdag/query.h"
 
-// A file, and the cells of each of its grids, found by brute force.
+// Writes a file of these voxels, and finds the set cells of each level by brute force.
 class QueryFile {
  public:
   using Cells = std::set<voxdag::query::Position>;  // in lexicographic order

@@ -1,4 +1,4 @@
-// DAGs in memory for tests of query/: from a set of voxels, or a wall in a grid of any size.
+// DAGs in memory for tests of query/: of a set of voxels, or of a wall in a grid of any size.
 #pragma once
 
 #include <array>
@@ -20,8 +20,8 @@ class VoxelScene {
     if (!voxels.empty()) add(0, {voxels.begin(), voxels.end()});
   }
 
-  // Returns the DAG of all voxels with x == `plane`. It has one node per level, and the four
-  // children of a node are the same node.
+  // Returns the DAG of all voxels with x == `plane`. It has one node per level; all four children
+  // of a node are the same node.
   static VoxelScene wall(uint32_t grid_levels, int64_t plane) {
     VoxelScene scene(grid_levels, {});
     for (uint32_t level = 0; level + 2 < grid_levels; ++level) {
@@ -36,7 +36,7 @@ class VoxelScene {
     return scene;
   }
 
-  // Returns the voxels from 6 to 9 along each axis of a grid of 16^3 voxels.
+  // Returns a block: the voxels from 6 to 9 along each axis, in a grid of 16^3 voxels.
   static VoxelScene block() {
     std::set<Voxel> voxels;
     for (int64_t x = 6; x < 10; ++x)

@@ -41,8 +41,9 @@ TEST_F(CApiTest, Facts) {
   EXPECT_EQ(facts.origin[1], dag_.origin()[1]);
 }
 
-// A program may be compiled with a newer header, whose structs have additional members. Additional
-// outputs are set to 0, and additional inputs must be 0. A struct_size of 0 or SIZE_MAX is refused.
+// A program that was compiled with a newer header passes structs with additional members. The
+// library sets additional output members to 0, and refuses additional input members that are not 0.
+// It also refuses a struct_size of 0 or SIZE_MAX.
 TEST_F(CApiTest, StructsOfOtherSizes) {
   EXPECT_STREQ(voxdag_version(), VOXDAG_VERSION);
   voxdag_facts facts{};
@@ -51,7 +52,7 @@ TEST_F(CApiTest, StructsOfOtherSizes) {
     voxdag_facts known{};
     uint64_t unknown = 7, behind = 7;
   } later;
-  facts.struct_size = SIZE_MAX;  // as in a struct that was not initialized
+  facts.struct_size = SIZE_MAX;  // a member of a struct that was not initialized
   EXPECT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_INVALID_INPUT);
   later.known.struct_size = sizeof(voxdag_facts) + 8;
   ASSERT_EQ(voxdag_get_facts(file_, &later.known), VOXDAG_OK);

@@ -17,8 +17,8 @@ class CombineErrors : public Combine {
     write_global(path("a"), random_voxels(7, 64));
     write_global(path("b"), random_voxels(8, 64));
   }
-  // Writes the union with little memory for lists, so that longer lists are in scratch files.
-  // Returns the code of the error; nullopt without an error.
+  // Writes the union of a and b, with so little memory that lists of over 256 bytes are in scratch
+  // files. Returns the code of the error; nullopt without an error.
   std::optional<ErrorCode> combine_error(FileSystem& files, const CancelToken& cancel) {
     try {
       const auto a = open_global_file(path("a")), b = open_global_file(path("b"));
@@ -33,7 +33,7 @@ class CombineErrors : public Combine {
   }
 };
 
-// Any damaged byte of the levels or of the checksum table of either file is detected.
+// A damaged byte in any level of either file, and a truncated checksum table, are detected.
 TEST_F(CombineErrors, DamagedInputs) {
   for (const char* name : {"a", "b"}) {
     const std::string intact = bytes(name);
@@ -53,8 +53,9 @@ TEST_F(CombineErrors, DamagedInputs) {
   }
 }
 
-// Wrong levels whose checksums are correct are refused: pointers to the middle of a node, to the
-// end of the level and behind it, wrong child masks, empty bricks, and nodes in a wrong order.
+// A file whose levels have wrong words but correct checksums is refused. The wrong words are
+// pointers to the middle of a node, to the end of a level and beyond it, wrong child masks, empty
+// bricks, and words that put nodes in a wrong order.
 TEST_F(CombineErrors, HostileLevels) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(7, 64), 64);
   const auto intact = level_words(dag);
@@ -80,7 +81,7 @@ TEST_F(CombineErrors, HostileLevels) {
         write(levels);
         SCOPED_TRACE(testing::Message() << i << " " << at << " " << wrong);
         const auto error = combine_error(system_files(), never_);
-        // By chance, the changed word can lead to another valid DAG.
+        // No error is also possible, because the changed word can give another valid DAG.
         EXPECT_EQ(error.value_or(ErrorCode::kCorrupt), ErrorCode::kCorrupt);
         if (!error) std::filesystem::remove(path("out"));
         expect_files({"a", "b"});
@@ -117,8 +118,9 @@ TEST_F(CombineErrors, FailingReads) {
   EXPECT_GT(failed, 5u);
 }
 
-// The process is killed at some operations. Afterwards the same command succeeds, unless the killed
-// process had finished its output. The command removes the killed process's temporary files.
+// The process is killed after each of many operations. The same command then succeeds, and removes
+// the temporary files of the killed process. If the killed process had already finished its output,
+// the command refuses to replace it.
 TEST_F(CombineErrors, Killed) {
   combine_error(system_files(), never_);
   const std::string clean = bytes("out");

@@ -41,7 +41,8 @@ class Combine : public testing::Test {
     return spec;
   }
 
-  // Combines two files of the folder, and verifies the written file.
+  // Combines the files `a` and `b` of the folder. Verifies the result, and compares its counts with
+  // the report.
   CombineReport combine_files(const std::string& a, const std::string& b, const CombineSpec& spec) {
     const auto file_a = open_global_file(path(a)), file_b = open_global_file(path(b));
     const CombineReport report = combine(*file_a, *file_b, spec, system_files(), warnings_, never_);
@@ -76,7 +77,8 @@ class Combine : public testing::Test {
   CancelToken never_;
 };
 
-// Returns the voxels for which `is_set` is true, given whether `a` and `b` have the voxel.
+// Returns the voxels at whose position is_set(in_a, in_b) is true, where the arguments tell whether
+// `a` and `b` have the voxel.
 template <class IsSet>
 oracle::Voxels voxels_of(const oracle::Voxels& a, const oracle::Voxels& b, const IsSet& is_set) {
   oracle::Voxels voxels(a.edge());

@@ -6,7 +6,7 @@
 namespace voxdag::query {
 namespace {
 
-// Returns voxels like `voxels`, with a small box of them set.
+// Returns `voxels`, and additionally all voxels of a small box.
 oracle::Voxels with_box(const oracle::Voxels& voxels, uint64_t seed) {
   oracle::Random random(seed);
   const int edge = voxels.edge();
@@ -17,7 +17,8 @@ oracle::Voxels with_box(const oracle::Voxels& voxels, uint64_t seed) {
   return changed;
 }
 
-// Two scenes with full cubes of several sizes, shared subtrees and single voxels.
+// Returns two scenes. Depending on `seed`, they are random, differ by a small box, or both contain
+// large full cubes.
 std::array<oracle::Voxels, 2> scenes(uint64_t seed, int edge) {
   std::array<oracle::Voxels, 2> scenes = {random_voxels(seed, edge), random_voxels(seed + 1, edge)};
   if (seed % 3 == 1) scenes[1] = with_box(scenes[0], seed);
@@ -29,7 +30,8 @@ std::array<oracle::Voxels, 2> scenes(uint64_t seed, int edge) {
   return scenes;
 }
 
-// All operations give the right bytes, in grids from one brick up, for several hash bits.
+// All operations give the bytes of the oracle's file, in grids from a single brick up to 64^3
+// voxels, with full and with truncated hashes.
 TEST_F(Combine, EqualsTheOracle) {
   for (const int edge : {4, 8, 64})
     for (uint64_t seed = 0; seed < 3; ++seed)
@@ -47,7 +49,8 @@ TEST_F(Combine, EqualsTheOracle) {
       }
 }
 
-// Files without voxels, and results without voxels.
+// Combines files without voxels, and files whose combination has no voxels. Each empty result gives
+// a warning.
 TEST_F(Combine, EmptyFiles) {
   write_global(path("a.vdag"), random_voxels(3, 32));
   write_global(path("empty.vdag"), oracle::Voxels(32));
@@ -90,7 +93,8 @@ TEST_F(Combine, Identities) {
               combined("all", Operation::kMinus, "either", "d"));
 }
 
-// Equal nodes of both files end their pair, so two files that differ in one place have few pairs.
+// combine() visits pairs of nodes, one of each file, at the same place. It does not visit the
+// children of two equal nodes, so files that differ in one voxel have few pairs.
 TEST_F(Combine, FewPairsOfSimilarFiles) {
   const oracle::Voxels a = random_voxels(6, 128);
   oracle::Voxels b = a;
@@ -102,7 +106,7 @@ TEST_F(Combine, FewPairsOfSimilarFiles) {
   EXPECT_EQ(combine_files("a", "a", spec(Operation::kXor, "c")).pairs, 0u);
 }
 
-// The bytes are the same if all lists and values are in scratch files.
+// With so little memory that lists are in scratch files, the bytes are the same.
 TEST_F(Combine, LittleMemory) {
   const auto [a, b] = scenes(200, 64);
   write_global(path("a"), a);
@@ -117,7 +121,7 @@ TEST_F(Combine, LittleMemory) {
   }
 }
 
-// Levels with wide pointers, in the inputs and in the result.
+// Inputs and results may have levels with wide (64-bit) pointers.
 TEST_F(Combine, WideLevels) {
   const auto [a, b] = scenes(300, 64);
   const uint64_t narrow_words = 64;

@@ -8,7 +8,8 @@ namespace {
 
 class CombineCut : public Combine {
  protected:
-  // Checks a cut. `is_inside` receives the center of a voxel.
+  // Cuts `shape` from a file of the voxels `a`, and compares the result with the oracle's.
+  // is_inside(x, y, z) tells whether the shape contains this point, the center of a voxel.
   template <class IsInside>
   void expect_cut(const oracle::Voxels& a, const std::string& shape, const IsInside& is_inside) {
     SCOPED_TRACE(shape);

@@ -7,7 +7,8 @@ namespace {
 
 using Offset = std::array<int64_t, 3>;
 
-// Returns the voxels at an offset in a grid of `edge` voxels.
+// Returns `voxels` moved by `offset`, in a grid of `edge` voxels per edge. Voxels outside this grid
+// are dropped.
 oracle::Voxels moved_voxels(const oracle::Voxels& voxels, const Offset& offset, int edge) {
   oracle::Voxels moved(edge);
   const auto is_inside = [&](int64_t i) { return i >= 0 && i < edge; };
@@ -23,7 +24,7 @@ oracle::Voxels moved_voxels(const oracle::Voxels& voxels, const Offset& offset, 
 
 class CombineMoved : public Combine {
  protected:
-  // Writes voxels as a file with voxels of edge 0.5.
+  // Writes a file with voxels of edge 0.5. `low` is added to the x of the grid's origin.
   void write(const std::string& name, const oracle::Voxels& voxels, double low = 0) {
     Grid grid = grid_of(voxels.edge());
     grid.origin[0] += low;
@@ -81,7 +82,7 @@ TEST_F(CombineMoved, LittleMemory) {
   expect_moved(a, b, little);
 }
 
-// Moving there and back gives the same file.
+// Moving voxels by an offset and then by the opposite offset gives the original file.
 TEST_F(CombineMoved, ThereAndBack) {
   oracle::Voxels b(64);
   fill(b, {8, 9, 10}, {30, 31, 40});

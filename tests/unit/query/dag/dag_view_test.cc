@@ -10,8 +10,8 @@ using namespace voxdag::query;
 
 namespace {
 
-// At the level of voxels, the view visits every voxel once, at its position. It does not visit
-// children that the selection excludes.
+// for_each_cell() at the finest level visits each voxel once, with its position. It does not visit
+// children that the selection function excludes.
 TEST(DagView, VisitsTheSelectedCells) {
   const std::set<VoxelScene::Voxel> voxels = {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}, {31, 31, 31}};
   const VoxelScene scene(5, voxels);
@@ -26,7 +26,7 @@ TEST(DagView, VisitsTheSelectedCells) {
       5, [](const DagView::Cell&) { return 0xffu; }, add);
   EXPECT_EQ(seen, std::multiset<VoxelScene::Voxel>(voxels.begin(), voxels.end()));
   seen.clear();
-  // Selects only the half of the grid with x >= 16.
+  // Excludes the four children of the root with x < 16.
   dag.for_each_cell(
       5, [](const DagView::Cell& c) { return c.depth == 0 ? 0xf0u : 0xffu; }, add);
   EXPECT_EQ(seen, (std::multiset<VoxelScene::Voxel>{{20, 10, 1}, {31, 31, 31}}));

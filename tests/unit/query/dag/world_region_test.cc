@@ -1,4 +1,4 @@
-// Converts boxes and points from world space to cells.
+// Tests the conversion of boxes and points from world space to cells.
 #include <gtest/gtest.h>
 
 #include <limits>
@@ -32,8 +32,8 @@ class WorldRegion : public testing::Test {
   std::unique_ptr<voxdag_reader::File> file_;
 };
 
-// The low corner of a cell, computed in doubles, is in that cell. A box that ends at this corner
-// does not contain the cell.
+// The low corner of a cell belongs to this cell, although its world coordinates are rounded
+// doubles. A box that ends at this corner does not contain the cell.
 TEST_F(WorldRegion, CornersOfCellsAreExact) {
   std::mt19937 random(5);
   const auto number = [&] { return static_cast<int64_t>(random() % kEdge); };
@@ -53,7 +53,8 @@ TEST_F(WorldRegion, CornersOfCellsAreExact) {
   }
 }
 
-// A coordinate that is slightly inside a cell is not moved to the cell's boundary.
+// The tolerance for corners is small: a coordinate that is 1e-6 cells away from a cell's boundary
+// is not moved to it.
 TEST_F(WorldRegion, OtherPlacesStay) {
   for (const double part : {1e-6, 0.001, 0.25}) {
     EXPECT_EQ(cell(0, world(0, 1000 - part)), 999);

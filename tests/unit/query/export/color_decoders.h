@@ -19,7 +19,7 @@ namespace voxdag::query {
 using Cell3 = std::array<int64_t, 3>;
 using Color3 = std::array<int, 3>;
 
-// Reads the numbers of a file one after the other.
+// Reads numbers and texts from the bytes of a file, one after the other.
 class FileNumbers {
  public:
   explicit FileNumbers(const std::string& bytes, size_t at = 0) : bytes_(bytes), at_(at) {}
@@ -184,8 +184,8 @@ inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& byt
   return faces;
 }
 
-// Reads the files of HashDAG. Finds a voxel's color as HashDAG's viewer does: descends the DAG and
-// counts the voxels before this voxel.
+// Decodes the two files that HashDAG's viewer reads: the DAG and its colors. Like the viewer, finds
+// a voxel's color by its index: descends the DAG and counts the voxels before this voxel.
 class HashDagColors {
  public:
   HashDagColors(const std::string& dag, const std::string& colors) {

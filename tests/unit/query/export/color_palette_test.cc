@@ -62,7 +62,7 @@ TEST(ColorPalette, IsNearManyColors) {
   for (const Rgb color : colors)
     squares += squared_distance(color, palette.colors()[palette.index_of(color)]);
   EXPECT_LT(squares / 3 / static_cast<double>(colors.size()), 16);
-  // Rare colors that are far from all others keep a color near them.
+  // The palette also has a color near a rare color that is far from all others.
   const Rgb rare{255, 0, 220};
   EXPECT_LT(squared_distance(rare, palette.colors()[palette.index_of(rare)]), 300);
 }
@@ -73,7 +73,7 @@ TEST(ColorPalette, DependsOnTheColorsOnly) {
   const ColorPalette palette = palette_of(colors, budget);
   std::shuffle(colors.begin(), colors.end(), std::mt19937(1));
   EXPECT_EQ(palette_of(colors, budget).colors(), palette.colors());
-  // This checksum is the same on every machine and with every compiler.
+  // The palette must be the same on every machine and with every compiler.
   uint32_t sum = 0;
   for (const Rgb color : palette.colors()) {
     sum = sum * 31 + color.r;

@@ -1,5 +1,6 @@
-// Files of few voxels. One has two voxels in opposite corners of the grid, which every format can
-// hold. The other has a voxel at the low corner of each of many equal cubes.
+// Writes files with few voxels. write_corners() sets the two voxels in opposite corners of the
+// grid; every format can store this file. write_tiles() divides the grid into equal cubes and sets
+// the voxel at the low corner of each.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 namespace voxdag::query {
 
-// Writes a level of `nodes` nodes, whose words are `words`.
+// Writes the level `level` with `nodes` nodes and the words `words`.
 inline void write_level(GlobalFileWriter& writer, uint32_t level, uint64_t nodes,
                         const std::vector<uint32_t>& words) {
   writer.begin_level(level);
@@ -32,8 +33,8 @@ inline void write_corners(const std::string& path, uint32_t levels) {
   write_corners(path, Grid::given({0, 0, 0}, 1, levels));
 }
 
-// Writes a grid of 2^levels voxels per edge that contains 8^tile_levels equal cubes, all of which
-// are one node of the DAG.
+// Writes a grid of 2^levels voxels per edge that is divided into 8^tile_levels cubes with one voxel
+// each. All cubes are the same node of the DAG.
 inline void write_tiles(const std::string& path, uint32_t levels, uint32_t tile_levels) {
   GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
   write_level(writer, levels - 2, 1, {1, 0});

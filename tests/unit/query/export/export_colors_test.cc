@@ -1,5 +1,5 @@
-// In each format that stores colors, the colors of exported voxels equal the colors that the reader
-// returns: for complete files, regions and coarser levels.
+// In each format that stores colors, exported voxels have the colors that the reader returns. Tests
+// complete files, regions and coarser levels.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,8 @@
 namespace voxdag::query {
 namespace {
 
-// Returns few colors in large patches, fewer colors than a palette has.
+// Returns the colors of a scene with eight large patches, one color each. A palette can store all
+// of them.
 SumOf patches(uint32_t color_levels) {
   return [=](uint64_t code) {
     const uint64_t patch = code >> 3 * (color_levels - 1);
@@ -69,8 +70,8 @@ class ExportColors : public testing::Test {
     return cells;
   }
 
-  // Calls check() with selections of two files: the complete file, a region, and a coarser level.
-  // The first file has colors as fine as its voxels, the second has coarser colors.
+  // Calls check(selection) for selections of two files: a complete file, two regions, and a coarser
+  // level. In the first file colors are as fine as voxels; in the second they are coarser.
   template <class Check>
   void for_each_case(const Check& check) {
     open(6, 6, smooth_colors(6, 20), 1);
@@ -116,8 +117,8 @@ TEST_F(ExportColors, VoxHasAPaletteOfManyColors) {
   });
 }
 
-// HashDAG numbers colored voxels with 32 bits. In this test the selection is the complete grid, and
-// its colors are coarser than its voxels.
+// HashDAG numbers colored voxels with 32 bits, so this export is refused, and the message names a
+// level that fits. The selection is the complete grid, and its colors are coarser than its voxels.
 TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
   constexpr uint32_t kLevels = 12;
   ColoredScene colors{2, 2, Codes(64), patches(2)};
@@ -140,7 +141,7 @@ TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
   EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
 }
 
-// The work for colors is part of the reported progress.
+// The stages of an export report the work for colors as progress.
 TEST_F(ExportColors, ProgressIsReported) {
   open(6, 6, patches(6), 1);
   for (const ExportFormat& format : export_formats()) {
@@ -154,7 +155,8 @@ TEST_F(ExportColors, ProgressIsReported) {
   }
 }
 
-// In a grid of over 256 voxels per edge, the .vox file has one model per cube of 256 voxels.
+// A model of a .vox file has at most 256 voxels per edge, so the export of a larger grid has a
+// model for each cube of 256 voxels per edge that has voxels.
 TEST_F(ExportColors, VoxHasAModelForEachPlace) {
   open(9, 9, patches(9), 4);
   const auto decoded = decode_vox(bytes_of("vox", {9, whole_grid(9)})[0], 512);
@@ -184,7 +186,8 @@ TEST_F(ExportColors, GlbHasLinearColorsOfFaces) {
   });
 }
 
-// Faces of one color are merged into rectangles, as in a gray file.
+// Adjacent faces of one color are merged into rectangles, like all adjacent faces in a file without
+// colors.
 TEST_F(ExportColors, GlbMergesFacesOfOneColor) {
   std::vector<uint64_t> sheet;
   for (uint32_t x = 0; x < 64; ++x)
@@ -195,7 +198,8 @@ TEST_F(ExportColors, GlbMergesFacesOfOneColor) {
   file_ = open_global_file(path);
   size_t rectangles = 0;
   decode_glb(bytes_of("glb", {6, whole_grid(6)})[0], {0, 0, 0}, rectangles);
-  // Four patches on each of the two large sides, and two along each of the four edges.
+  // The sheet has four patches. Each of its two large sides has a rectangle for each patch, and
+  // each of its four narrow sides has two rectangles.
   EXPECT_EQ(rectangles, 16u);
 }
 

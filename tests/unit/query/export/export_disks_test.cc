@@ -1,5 +1,5 @@
-// Exports that are killed, and exports to full disks. A file with a final name is never partial,
-// and leftovers do not prevent the next export.
+// Kills exports, and exports to full disks. A file with a final name is always complete, and
+// temporary files of a killed export do not prevent the next export.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +39,7 @@ class ExportDisks : public testing::TestWithParam<std::string> {
   std::vector<std::string> paths(const std::string& name) const {
     return export_paths(format(), output(name));
   }
-  // Returns the bytes of all files of an export, and removes the files.
+  // Returns the bytes of all files that the export `name` wrote, and removes these files.
   std::vector<std::string> take(const std::string& name) {
     std::vector<std::string> bytes;
     for (const std::string& path : paths(name)) {
@@ -57,7 +57,8 @@ class ExportDisks : public testing::TestWithParam<std::string> {
 using ExportKilled = ExportDisks;
 using ExportTruncated = ExportDisks;
 
-// After a kill, the same command succeeds, unless the killed command had already completed a file.
+// After a kill, the same command succeeds. If the killed command had already completed a file, the
+// command refuses to replace this file without --force.
 TEST_P(ExportKilled, IsRepeatedByTheSameCommand) {
   run(system_files(), "clean");
   const std::vector<std::string> clean = take("clean");
@@ -92,8 +93,8 @@ TEST_P(ExportKilled, IsNotConfusedWithARunningOne) {
   EXPECT_EQ(system_files().list(folder_.path()).size(), 2u);
 }
 
-// voxdag leaves a partial file only together with an empty lock file. So a partial file without a
-// lock file, or with a lock file that has contents, was not made by voxdag and is kept.
+// A killed export leaves a partial file and an empty lock file. A partial file without a lock file,
+// or with a lock file that has contents, belongs to another program, so the export keeps it.
 TEST_P(ExportKilled, ButTheFilesOfOthersStay) {
   const std::string partial = output("out") + ".partial", lock = output("out") + ".lock";
   for (const bool has_lock : {false, true}) {
@@ -109,8 +110,8 @@ TEST_P(ExportKilled, ButTheFilesOfOthersStay) {
   }
 }
 
-// The disk is full from the n-th write on. The export reports this, even if the format's library
-// reports a different error.
+// All writes from the n-th on fail as on a full disk. The export fails with kNoSpace, even if the
+// format's library reports a different error.
 TEST_P(ExportDisks, Full) {
   uint64_t failed = 0;
   for (;; ++failed) {
@@ -155,7 +156,7 @@ std::vector<std::string> all_formats() {
 }
 INSTANTIATE_TEST_SUITE_P(Formats, ExportDisks, testing::ValuesIn(all_formats()), name_of);
 
-// Truncates the input file when the export creates its output.
+// Truncates the input file at the moment when the export creates its output.
 class Truncating : public ForwardingFiles {
  public:
   explicit Truncating(const std::string& input) : ForwardingFiles(system_files()), input_(input) {}
@@ -168,7 +169,8 @@ class Truncating : public ForwardingFiles {
   const std::string input_;
 };
 
-// If the input is truncated during an export, the export fails, but the process does not end.
+// If the input, which is mapped, is truncated during an export, the export fails with an error, and
+// no signal ends the process.
 TEST_P(ExportTruncated, IsAnError) {
   Truncating files(folder_.file("a.vdag"));
   const Error error = error_of([&] { run(files, "out"); });
@@ -180,7 +182,7 @@ TEST_P(ExportTruncated, IsAnError) {
   expect_only_the_input();
 }
 
-// The formats whose exports read the input while they write.
+// Exports of these formats read the input after they have created the output.
 INSTANTIATE_TEST_SUITE_P(Formats, ExportTruncated,
                          testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ply", "npz",
                                          "vtu", "inp"),

@@ -1,7 +1,7 @@
-// Limits that only files of many gigabytes reach. The header of the input has the large counts, and
-// its levels are a hole in the file; some tests lower a limit instead. An export at the limit is
-// accepted. An export of one more than the limit is refused; the message names a level that fits,
-// and no files remain.
+// Tests limits of formats that only files of many gigabytes reach. The header of the input has the
+// large counts, and its levels are a hole in the file; some tests lower a limit instead. An export
+// of exactly the limit is accepted. An export of one more is refused; the message names a level
+// that fits, and no files remain.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -56,7 +56,8 @@ void write_hole(const std::string& path, const std::vector<GlobalLevel>& levels)
 
 class ExportHuge : public testing::Test {
  protected:
-  // Returns the error of an export of a complete file. Checks that the export leaves no files.
+  // Exports a complete file with these levels, and returns the error. The levels have no valid
+  // nodes, so every such export fails.
   Error error(const std::vector<GlobalLevel>& levels, const ExportFormat& format) {
     write_hole(folder_.file("a.vdag"), levels);
     return error_of([&] { run(format, static_cast<uint32_t>(levels.size() + 1)); });
@@ -70,7 +71,8 @@ class ExportHuge : public testing::Test {
     return export_dag(system_files(), *file, request, progress, CancelToken{});
   }
 
-  // `problem` is the part of the message after the name of the output.
+  // Expects that the limit of the format refuses the export. `problem` is the message after the
+  // name of the output, and `fitting` begins with the level that fits.
   void expect_refused(const std::vector<GlobalLevel>& levels, const std::string& format,
                       const std::string& problem, const std::string& fitting) {
     const Error refused = error(levels, export_format(format));
@@ -80,7 +82,8 @@ class ExportHuge : public testing::Test {
         << refused.message();
     EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
   }
-  // The export passes the limit, and fails only because words, disk space or memory are missing.
+  // Expects that the limit does not refuse the export. It then fails for another reason, because
+  // all words are zero, or because disk space or memory is insufficient.
   void expect_not_refused(const std::vector<GlobalLevel>& levels, const std::string& format) {
     const Error error = this->error(levels, export_format(format));
     EXPECT_NE(error.code(), ErrorCode::kLimit) << error.message();
@@ -123,7 +126,8 @@ TEST_F(ExportHuge, PlayCanvasVoxelsCountLeavesWith24Bits) {
                  "7 (128");
 }
 
-// Divides `words` among three levels, so that no single level exceeds the limit of the format.
+// Returns `levels` with a total of `words` words in three of the levels, so that no single level
+// exceeds the limit of the format.
 std::vector<GlobalLevel> many_words(std::vector<GlobalLevel> levels, uint64_t words) {
   for (const size_t level : {4, 5, 6}) levels[level] = {k32Bits / 64, words / 3};
   levels[4].words += words - words / 3 * 3;
@@ -139,8 +143,8 @@ TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
                  "9 (512");
 }
 
-// Below its top levels, HashDAG stores counts of voxels with 24 bits. In the top levels, a node has
-// an index of 24 bits instead of the count.
+// HashDAG's top levels must have fewer than 2^24 nodes in total, because each of them stores a
+// 24-bit index where other nodes store a count of voxels.
 TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
   std::vector<GlobalLevel> levels = chain(17);
   const uint64_t others = 9;
@@ -152,8 +156,8 @@ TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
                  "16 (65536");
 }
 
-// A brick takes one word, and one more word for each octant with voxels. Here all octants are
-// empty.
+// In an SVDAG file, a brick has one word, and one more word for each octant with voxels. Here all
+// octants of the bricks are empty.
 TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
   const uint64_t others = 2 * 5 + 1 + 255;
   expect_not_refused(many_words(chain(10), k32Bits - 1 - others), "svdag");
@@ -177,7 +181,8 @@ TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
   constexpr uint64_t kVoxels = uint64_t{1} << (3 * kLevels - 1), kQuadBytes = 72;
   writer.finish({kVoxels, svo_nodes});
 
-  // The file needs exactly one byte more than the first limit, and exactly the second limit.
+  // The file has exactly one byte more than the limit of the first export, and exactly as many
+  // bytes as the limit of the last export.
   ExportFormat format = export_format("glb");
   format.write = [](const ExportJob& job) {
     return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes - 1);

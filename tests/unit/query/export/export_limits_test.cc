@@ -20,7 +20,8 @@ namespace {
 
 class ExportLimits : public ::testing::Test {
  protected:
-  // Writes and opens a file of a grid in which every voxel is set, or every brick has this mask.
+  // Writes and opens a file in which every brick has the voxels of `mask`; by default, all voxels
+  // are set.
   std::unique_ptr<voxdag_reader::File> full_grid(uint32_t levels, uint64_t mask = ~uint64_t{0}) {
     const std::string path = folder_.file("full.vdag");
     GlobalFileWriter writer(system_files(), path, Grid::given({0, 0, 0}, 1, levels), 64);
@@ -40,7 +41,8 @@ class ExportLimits : public ::testing::Test {
     return open_global_file(path);
   }
 
-  // Returns the message with which an export of the complete file is refused.
+  // Expects that an export of the complete file is refused with this code and leaves no files.
+  // Returns the message.
   std::string refusal(const voxdag_reader::File& file, const std::string& format,
                       const std::string& output, ErrorCode code, uint64_t memory_bytes) {
     const Selection all{file.grid_levels(), whole_grid(file.grid_levels())};
@@ -68,8 +70,8 @@ class ExportLimits : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-// The message gives the region in cells of the coarser grid that fits, because the cells have other
-// coordinates in that grid.
+// If the export of a region is refused, the message names a coarser level that fits, and the region
+// in cells of that level.
 TEST_F(ExportLimits, TheRegionThatFitsIsNamed) {
   const Selection part{11, {{3, 4, 5}, {2047, 1025, 2000}}};
   const std::string message =
@@ -90,7 +92,8 @@ TEST_F(ExportLimits, PlyNamesTheLevelThatFits) {
   }
 }
 
-// The limits of meshes of hexahedra, and the memory for two layers.
+// The readers of .vtu and .inp files limit the number of voxels. In addition, the memory must hold
+// two layers of the grid. A message names the level that fits the format.
 TEST_F(ExportLimits, MeshesNameTheLevelThatFits) {
   const auto file = full_grid(11);
   const std::string vtu = refusal(*file, "vtu", "a.vtu", ErrorCode::kLimit, kMemory);
@@ -108,8 +111,9 @@ TEST_F(ExportLimits, MeshesNameTheLevelThatFits) {
       << memory;
 }
 
-// The search for a level that fits begins with the coarsest level. In a full grid, counting the
-// voxels of a level that does not fit would take hours.
+// The search for a level that fits takes seconds, even in a full grid of 2^60 voxels, because it
+// begins with the coarsest level. Counting the voxels of a level that does not fit would take
+// hours.
 TEST_F(ExportLimits, AreFoundAtOnce) {
   const auto file = full_grid(20);
   const double start_s = process_cpu_seconds();
@@ -143,8 +147,9 @@ TEST_F(ExportLimits, OctoMapHas16Levels) {
   EXPECT_NE(message.find("--level 16 fits"), std::string::npos) << message;
 }
 
-// HashDAG counts voxels with 24 bits below its top levels. In a grid of 2^18 voxels per edge, a
-// full cube of 2^8 voxels per edge has too many voxels.
+// Below its top levels, HashDAG counts the voxels of a node with 24 bits. In a grid of 2^18 voxels
+// per edge, the largest such nodes are cubes of 2^8 voxels per edge; if they are full, they have
+// 2^24 voxels, one too many.
 TEST_F(ExportLimits, HashDagCountsVoxelsWith24Bits) {
   const std::string message =
       refusal(*full_grid(18), "hashdag", "a.basic_dag.dag.bin", ErrorCode::kLimit, kMemory);

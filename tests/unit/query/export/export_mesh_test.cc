@@ -1,5 +1,5 @@
-// Meshes of hexahedra have a hexahedron for each selected cell, and a point for each corner of
-// selected cells.
+// In an exported mesh, each selected cell is a hexahedron, and each corner of selected cells is one
+// point, even if several cells share it.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -100,7 +100,8 @@ class ExportMesh : public testing::TestWithParam<std::string> {
     EXPECT_EQ(report.voxels, mesh.cells.size());
     return mesh;
   }
-  // Compares the mesh with the cells of the oracle's voxels.
+  // Exports the selection of a file with these voxels. Checks that the mesh has a hexahedron for
+  // each selected cell, and no unused or duplicate points.
   void expect_mesh(const oracle::Voxels& voxels, const Selection& selection) {
     const DecodedMesh mesh = exported(voxels, selection);
     const int size = kEdge >> selection.grid_levels;
@@ -168,7 +169,7 @@ TEST_P(ExportMesh, SharesPoints) {
   }
 }
 
-// Voxels at opposite corners of the grid, and voxels with only an edge or a corner in common.
+// Exports voxels at opposite corners of the grid, and voxels that share only an edge or a corner.
 TEST_P(ExportMesh, SparseVoxels) {
   oracle::Voxels voxels(kEdge);
   for (const int at : {0, 3, 4, 63}) voxels.set(at, at, at);

@@ -1,5 +1,5 @@
-// Tests how each format shares equal subtrees, and the usage notes. The scene consists of 64 equal
-// cubes of 256^3 voxels.
+// Tests how the files of each format share equal subtrees, and which notes for users the reports
+// contain. The scene consists of 64 equal cubes of 256^3 voxels.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -20,7 +20,7 @@ class ExportSharing : public testing::Test {
     write_tiles(folder_.file("a.vdag"), kLevels, kTileLevels);
     file_ = open_global_file(folder_.file("a.vdag"));
   }
-  // Exports, reads the first written file, and returns the report.
+  // Exports the file, stores the bytes of the first output file in bytes_, and returns the report.
   ExportReport run(const char* name, uint32_t levels = kLevels) {
     const ExportFormat& format = export_format(name);
     NoProgress progress;
@@ -53,7 +53,8 @@ TEST_F(ExportSharing, VoxHasOneModelAndItsPlaces) {
             std::vector<std::string>{"z is up: a voxel (x, y, z) is at (x, -z, y); 64 instances"});
 }
 
-// The file has a word for the root and one word for each child pointer of the DAG.
+// An exported file has one word for the root and one word for each child pointer of the DAG, so
+// equal subtrees are shared.
 TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(run("voxel").notes, std::vector<std::string>{});
   const auto json = nlohmann::json::parse(bytes_);
@@ -64,7 +65,8 @@ TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(json["leafDataCount"], 2);
 }
 
-// The exported files have as many words as the nodes of the input's DAG take in each format.
+// Each node of the DAG is exported once: the files have exactly the words that its nodes take in
+// each format.
 TEST_F(ExportSharing, HashDagAndSvdagHaveTheNodesOfTheFile) {
   const uint64_t words = 9 * kTileLevels + 2 * (kLevels - 2 - kTileLevels);
   run("hashdag");

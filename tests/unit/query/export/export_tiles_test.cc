@@ -1,5 +1,5 @@
-// Full cubes, which solids have, cost little: exports to trees have tiles for them, and exports of
-// surfaces visit only their sides.
+// Full cubes, as in solids, take little memory and file size: formats that store trees have one
+// tile for a full cube, and exports of surfaces visit only its sides.
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -15,7 +15,7 @@ namespace {
 
 class ExportTiles : public testing::Test {
  protected:
-  // A ball, some scattered voxels, and two cubes of which one has a hole.
+  // Returns a ball, scattered voxels, and two cubes, one of which has a hole.
   static oracle::Voxels solid() {
     oracle::Voxels voxels = random_voxels(9, 64);
     for (int x = 0; x < 64; ++x)
@@ -49,8 +49,8 @@ class ExportTiles : public testing::Test {
 
 using Cell = std::array<int64_t, 3>;
 
-// Bricks and full cubes together have the cells of the bricks. Full cubes are aligned, and no
-// larger cube is full.
+// for_each_brick_or_full_cube() visits the same cells as for_each_brick(), each cell once. The full
+// cubes that it visits are aligned, and no full cube is part of a larger full cube.
 TEST_F(ExportTiles, BricksAndFullCubesAreAllCells) {
   const auto file = open(solid());
   const DagView dag(*file);

@@ -31,7 +31,7 @@ class ExportValues : public testing::Test {
                progress, CancelToken{});
     return read_bytes(output);
   }
-  // The values that the reader returns for a cell, in the order of the export.
+  // Values of a cell according to the reader.
   struct Cell {
     uint8_t alpha;
     voxdag_reader::Normal normal;

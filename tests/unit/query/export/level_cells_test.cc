@@ -1,4 +1,5 @@
-// Tests the counts of cells that exports use to find a level that fits.
+// Tests LevelCells, which counts the cells of each level. Exports use it to find a level that fits
+// their format.
 #include "query/export/level_cells.h"
 
 #include "core/format/global/open_global.h"
@@ -13,7 +14,8 @@ constexpr uint64_t kNoLimit = ~uint64_t{0};
 
 class LevelCellsTest : public testing::TestWithParam<uint64_t> {
  protected:
-  // Writes the file from random voxels. Levels of over GetParam() words are wide.
+  // Writes a file with random voxels. Levels of more than GetParam() words have wide (64-bit)
+  // pointers.
   void write(uint64_t seed) {
     const oracle::Voxels voxels = random_voxels(seed, 1 << kCellLevels);
     write_global(path_, oracle::build_dag(voxels, 64), grid_of(1 << kCellLevels), 64, GetParam());
@@ -60,7 +62,7 @@ TEST_P(LevelCellsTest, PointersToNoNodeAreDamage) {
   write(1);
   ByteString bytes = read_bytes(path_);
   const uint64_t root = open_global_file(path_)->level(0).file_offset;
-  ++bytes[root + 4];  // its first pointer, into the middle of a node
+  ++bytes[root + 4];  // the root's first pointer now leads into the middle of a node
   write_bytes(path_, bytes);
   const auto file = open_global_file(path_);
   const DagView dag(*file);

@@ -11,7 +11,7 @@
 
 namespace voxdag::query {
 
-// Stages of the same name count as one.
+// Adds up the work of stages that have the same name.
 class Stages : public NoProgress {
  public:
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override {
@@ -21,9 +21,9 @@ class Stages : public NoProgress {
   }
   void advance(uint64_t count) override { stage_->done += count; }
 
-  // Checks that every stage reports progress. All stages know their total at the start, except
-  // stages that count something. If a library writes the file, the total number of bytes is an
-  // estimate.
+  // Checks that every stage has reported progress. Stages except `count` and `select` must know
+  // their total at the start. The work done must equal the total, except for bytes that a library
+  // writes, whose total is an estimate.
   void expect_complete() const {
     for (const auto& [name, stage] : stages) {
       EXPECT_GT(stage.done, 0u) << name;

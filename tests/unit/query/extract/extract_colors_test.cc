@@ -11,8 +11,8 @@ namespace {
 
 using Color3 = SectionDecoder::Color3;
 
-// Convert between a stored sRGB value, from 0 to 255, and linear light, from 0 to 1 (IEC
-// 61966-2-1).
+// linear_of() and stored_of() convert between a stored sRGB value, from 0 to 255, and linear light,
+// from 0 to 1 (IEC 61966-2-1).
 double linear_of(int stored) {
   const double s = stored / 255.0;
   return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
@@ -21,9 +21,10 @@ double stored_of(double linear) {
   return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
 }
 
-// Each cell has one of two colors, chosen at random, so a cell with another cell's color is
-// noticed. All mixtures of the two colors are on a line, which color blocks encode well.
-constexpr int kTolerance = 40;  // the two colors differ by 130
+// Gives each cell one of two colors at random, so that a test notices if a cell has the color of
+// another cell. Mixtures of the two colors are on a line in color space, which color blocks encode
+// well.
+constexpr int kTolerance = 40;  // the channels of the two colors differ by at least 120
 SumOf two_colors() {
   return [](uint64_t code) {
     return oracle::Random(code).between(0, 1) ? sum_of_color(220, 180, 30, 1)
@@ -45,8 +46,8 @@ class ExtractColors : public Extract {
     return selection.region.contains({x * edge, y * edge, z * edge}, edge);
   }
 
-  // Returns the scene of the selected part. `cube` is the position of the part's grid in the
-  // input's grid.
+  // Returns the scene that the extract of `selection` contains. `cube` is the part of the input's
+  // grid that becomes the extract's grid.
   ColoredScene part_of_scene(const Selection& selection, const Cube& cube) const {
     ColoredScene part;
     part.levels = selection.grid_levels - cube.level;
@@ -61,7 +62,8 @@ class ExtractColors : public Extract {
     return morton_encode(cube.position[0], cube.position[1], cube.position[2]);
   }
 
-  // Extracts, and compares the colors of all cells on all levels.
+  // Extracts the selection and checks the colors of all cells on all levels: cells that the region
+  // does not cut have the input's color; other cells have the mean of their remaining finest cells.
   void check(const Selection& selection, bool crop) {
     const Cube cube = crop ? crop_cube(selection) : Cube{};
     const ColoredScene part = part_of_scene(selection, cube);
@@ -78,7 +80,8 @@ class ExtractColors : public Extract {
     };
     const uint32_t finest = part.color_levels + cube.level;
     for (uint32_t level = cube.level; level <= finest; ++level) {
-      // The mean color, in linear light, of the finest cells that remain in each cell.
+      // For each cell of the level: the sums of the linear colors of its finest cells in the
+      // extract, and their number.
       std::map<uint64_t, std::array<double, 4>> means;
       for (const uint64_t code : part.cells(part.color_levels)) {
         const uint64_t whole_code = code_of(cube) << 3 * part.color_levels | code;
@@ -105,7 +108,8 @@ class ExtractColors : public Extract {
     }
   }
 
-  // True if a cell of the input is in a color region that the extract copies unchanged.
+  // True if the cell is in a color region that the extract copies without encoding it again. Its
+  // color must then be equal to the input's, not only near it.
   bool is_copied(const Selection& selection, const Cube& cube, uint32_t finest, uint32_t level,
                  uint64_t code) const {
     const uint32_t c = scene_.color_levels;
@@ -165,8 +169,9 @@ TEST_F(ExtractColors, OfRegions) {
   EXPECT_GT(cut_, 100u);
 }
 
-// The octants of the grid have separate color regions, and the color grid ends at the finest level
-// of a tier. So the extract of an octant has the bytes of a file that contains only this octant.
+// An octant of the grid consists of complete color regions, because the color grid ends at the
+// finest level of a tier. So the extract of an octant has the bytes of a file that contains only
+// this octant.
 TEST_F(ExtractColors, OfAnAlignedCubeAreThoseOfItsScene) {
   for (const auto& [levels, color_levels] : {std::pair{9u, 7u}, {7u, 7u}}) {
     write(levels, color_levels, smooth_colors(color_levels, 20));
@@ -217,8 +222,8 @@ TEST_F(ExtractColors, OfNothing) {
   EXPECT_EQ(open_global_file(path("out.vdag"))->version(), 1u);
 }
 
-// Damage is reported in a copied color, in a color that is encoded again, and in the directory of
-// color regions.
+// The extract reports damage in a color region that it copies, in a region that it encodes again,
+// and in the directory of color regions.
 TEST_F(ExtractColors, DamageIsFound) {
   write(8, 8);
   const std::string intact = bytes("in.vdag");

@@ -30,7 +30,7 @@ class ExtractErrors : public Extract {
   }
 };
 
-// Any damaged byte of the levels or of the checksum table is detected when it is read.
+// A damaged byte in any level or in the checksum table is detected.
 TEST_F(ExtractErrors, DamagedInput) {
   const std::string intact = bytes("in.vdag");
   const auto file = open_global_file(path("in.vdag"));
@@ -57,7 +57,7 @@ TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
   const oracle::Dag dag = oracle::build_dag(voxels, 64);
   for (const uint32_t wrong : {1u, 2u, 40u}) {
     auto levels = level_words(dag);
-    levels[1][1] = wrong;  // from the node above the only brick
+    levels[1][1] = wrong;  // the pointer to the only brick
     GlobalFileWriter writer(system_files(), path("in.vdag"), grid_of(16), 64);
     for (uint32_t i = 0; i < levels.size(); ++i) {
       writer.begin_level(2 - i);
@@ -69,7 +69,7 @@ TEST_F(ExtractErrors, OffsetsThatLeadNowhere) {
     const auto file = open_global_file(path("in.vdag"));
     for (const uint32_t grid_levels : {2u, 3u, 4u}) {
       ExtractSpec whole = spec("out.vdag", {grid_levels, whole_grid(grid_levels)});
-      whole.majority = grid_levels == 2;  // reads the bricks for a grid of this level as well
+      whole.majority = grid_levels == 2;  // so that the extract also reads the bricks
       EXPECT_EQ(error_of([&] { extract(*file, whole, system_files(), warnings_, never_); }).code(),
                 ErrorCode::kCorrupt)
           << wrong;
@@ -93,7 +93,7 @@ TEST_F(ExtractErrors, FullDisk) {
   EXPECT_GT(failed, 5u);
 }
 
-// If the n-th read fails, of the input or of a temporary file, the extract fails with kIo.
+// If the n-th read of the input or of a temporary file fails, the extract fails with kIo.
 TEST_F(ExtractErrors, FailingReads) {
   uint64_t failed = 0;
   for (uint64_t at = 1;; at += 1 + at / 8) {
@@ -108,9 +108,9 @@ TEST_F(ExtractErrors, FailingReads) {
   EXPECT_GT(failed, 5u);
 }
 
-// The process is killed at any operation. Afterwards the same extract succeeds, unless the killed
-// process had finished its output. The extract removes the temporary files and folders of the
-// killed process, and keeps files with other names.
+// The process is killed after each of its operations. The same extract then succeeds, and removes
+// the temporary files and folders of the killed process, but no files with similar names. If the
+// killed process had already finished its output, the extract refuses to replace it.
 TEST_F(ExtractErrors, Killed) {
   std::filesystem::create_directory(path("out.vdag.work-"));
   std::filesystem::create_directory(path("out.vdag.work-1234567"));
@@ -136,8 +136,9 @@ TEST_F(ExtractErrors, Killed) {
   EXPECT_GT(repeated, 5u);
 }
 
-// Cropping to a region around the middle of the grid gives the complete grid, and the extract warns
-// about this. A region on one side of the middle gives a smaller grid, without a warning.
+// The crop cube of a region around the middle of the grid is the complete grid. The extract then
+// warns that it was not cropped. The crop cube of a region on one side of the middle is smaller,
+// and gives no warning.
 TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   const auto is_said = [&](const Region& region, bool crop) {
     warnings_.texts.clear();
@@ -152,7 +153,8 @@ TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
 }
 
-// An existing file is replaced only with --force, even if voxdag created it.
+// An existing output is replaced only with `replace` (--force), even if an earlier extract wrote
+// it.
 TEST_F(ExtractErrors, ExistingOutput) {
   ExtractSpec part = spec("out.vdag", {5, whole_grid(5)});
   const auto file = open_global_file(path("in.vdag"));

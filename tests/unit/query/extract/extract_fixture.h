@@ -36,7 +36,7 @@ inline oracle::Voxels coarser(const oracle::Voxels& voxels, uint32_t levels) {
   return cells;
 }
 
-// Returns the voxels of a region, relative to the cube with this low corner and edge.
+// Returns the voxels in `region`, in a grid of `edge` voxels per edge whose low corner is `low`.
 inline oracle::Voxels part_of(const oracle::Voxels& voxels, const Region& region,
                               const std::array<int64_t, 3>& low, int edge) {
   oracle::Voxels part(edge);

@@ -6,7 +6,8 @@
 namespace voxdag::query {
 namespace {
 
-// Sets each voxel with a probability of 1/2, so that almost no two bricks are equal.
+// Returns a scene in which each voxel is set with a probability of 1/2, so that almost no two
+// bricks are equal.
 oracle::Voxels noise(uint64_t seed, int edge) {
   std::mt19937_64 random(seed);
   oracle::Voxels voxels(edge);
@@ -31,8 +32,8 @@ Region any_region(oracle::Random& random, uint32_t levels) {
   return region;
 }
 
-// Extracts of all levels have the right bytes, from the root brick to the level of the file, for
-// several hash bits.
+// Extracts of all levels have the bytes of the oracle's file, from the level of a single brick to
+// the input's level, with full and with truncated hashes.
 TEST_F(Extract, Levels) {
   const oracle::Voxels voxels = random_voxels(1, 128);
   for (const uint32_t hash_bits : {64u, 4u}) {
@@ -52,7 +53,7 @@ TEST_F(Extract, Levels) {
   EXPECT_EQ(warnings_.texts, std::vector<std::string>());
 }
 
-// Extracts of boxes at any position have the right bytes, with the complete grid and cropped.
+// Extracts of random boxes have the bytes of the oracle's file, with the complete grid and cropped.
 TEST_F(Extract, Regions) {
   const oracle::Voxels voxels = random_voxels(2, 64);
   write_global(path("in.vdag"), voxels);
@@ -95,7 +96,7 @@ TEST_F(Extract, CropCube) {
   EXPECT_EQ(crop_cube({2, {{1, 1, 1}, {2, 2, 2}}}), Cube{});
 }
 
-// Different sequences of extracts that lead to the same voxels give the same bytes.
+// Extracting in several steps gives the same bytes as extracting the same voxels in one step.
 TEST_F(Extract, InSteps) {
   write_global(path("in.vdag"), random_voxels(4, 128));
   extract_file("in.vdag", spec("half.vdag", {6, whole_grid(6)}));
@@ -141,7 +142,7 @@ TEST_F(Extract, MemoryAndThreads) {
   EXPECT_TRUE(bytes("whole.vdag") == bytes("in.vdag"));
 }
 
-// Wide levels can be read, and are written where the limit requires them.
+// Extracts read inputs with wide levels, and write wide levels where `narrow_words` requires them.
 TEST_F(Extract, WideLevels) {
   const oracle::Voxels voxels = random_voxels(6, 64);
   const oracle::Dag dag = oracle::build_dag(voxels, 64);

@@ -22,8 +22,9 @@ class ExtractValues : public Extract {
     return selection.region.contains({x * edge, y * edge, z * edge}, edge);
   }
 
-  // Extracts. Checks that the values of coarser cells follow from the finer cells, and compares the
-  // finest cells and all cells that the region does not cut.
+  // Extracts the selection. Compares the values of the finest cells, and of coarser cells that the
+  // region does not cut, with the input's. The decoder checks that the values of other coarser
+  // cells follow from their finer cells.
   void check(const Selection& selection, bool crop) {
     const Cube cube = crop ? crop_cube(selection) : Cube{};
     ColoredScene part;

@@ -10,7 +10,8 @@
 namespace voxdag::query {
 namespace {
 
-// The cells of the color grid are 4 voxels wide. The color grid has two tiers.
+// A file with 2^9 voxels and 2^7 colored cells per edge, so that a cell is 4 voxels wide. The color
+// grid has two tiers.
 class Colors : public testing::Test {
  protected:
   void SetUp() override {

@@ -47,7 +47,7 @@ std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
   return regions;
 }
 
-// Compares all functions with brute force, in every grid of three files of different sizes, with
+// Compares the functions of DagFile with brute force, for every level of files of three sizes, with
 // narrow and with wide levels.
 class DagFileTest : public testing::TestWithParam<std::tuple<int, uint64_t>> {
  protected:
@@ -109,7 +109,7 @@ TEST_P(DagFileTest, CountsAndListsAndFillsRegions) {
   }
 }
 
-// The counts are the same if there is no memory for stored counts.
+// count() gives the same results if DagFile has no memory to store the counts of nodes.
 TEST_P(DagFileTest, CountsWithoutStoredCounts) {
   const DagFile poor(file_.path(), 0);
   for (uint32_t levels = 0; levels <= dag_.grid_levels(); ++levels)
@@ -178,8 +178,8 @@ TEST_P(DagFileTest, FindsTheNearestCell) {
   }
 }
 
-// If several cells are at equal distances, the result is the cell with the lowest Morton code, for
-// any order of the search.
+// If several cells are equally near, nearest() returns the cell with the lowest Morton code,
+// independent of the search order.
 TEST(Dag, BreaksTiesByMortonCode) {
   oracle::Voxels voxels(16);
   for (const int x : {6, 10})
@@ -235,8 +235,8 @@ TEST(Dag, RefusesWrongArguments) {
   EXPECT_EQ(code_of([&] { DagFile nothing(file.path() + ".not"); }), ErrorCode::kNotFound);
 }
 
-// A query of a file with flipped bits gives some result, or an error that names the file. It reads
-// nothing outside the file, which the address sanitizer checks.
+// A query of a file with damaged bytes returns any result, or fails with an error that names the
+// file. It reads nothing outside the file; the address sanitizer checks this.
 TEST(Dag, SurvivesDamage) {
   for (const uint64_t narrow_words : {global_layout::kNarrowLevelWords, uint64_t{2}}) {
     const QueryFile file(random_voxels(11, 32), narrow_words);

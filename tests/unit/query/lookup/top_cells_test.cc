@@ -1,5 +1,5 @@
-// Lookups of so many points that they begin in TopCells, the table of a coarse grid, find exactly
-// the cells that are set.
+// Lookups of many points start at TopCells, a table of the nodes of a coarse grid, instead of the
+// root. They find exactly the cells that are set.
 #include "query/lookup/top_cells.h"
 
 #include <gtest/gtest.h>
@@ -62,7 +62,8 @@ TEST(TopCells, HaveTheNodesOfTheirGrid) {
       }
 }
 
-// Damage to nodes changes only the results of points whose descents visit these nodes.
+// A damaged node causes an error only for points whose descent visits this node. Lookups of other
+// points succeed, although they start at the same table.
 TEST(TopCells, LeaveDamageToThosePointsThatMeetIt) {
   const QueryFile file(random_voxels(6, 256));
   std::vector<Position> points;

@@ -73,8 +73,8 @@ double entry(const Ray& ray, const VoxelScene::Voxel& voxel) {
   return in <= out ? in : kFar;
 }
 
-// Compares the caster with an intersection of every voxel, for rays from inside and outside the
-// grid, in all directions.
+// For rays from inside and outside the grid, in all directions, the caster finds the same hit as an
+// intersection with every voxel.
 TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   constexpr uint64_t kSeed = 20240601;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -103,8 +103,8 @@ TEST(RayCaster, AgreesWithTryingEveryVoxel) {
   EXPECT_GT(hits, 300);
 }
 
-// A wall that is one voxel thick in a grid of 131072^3 has no cracks: rays at all angles hit it,
-// also through edges and corners of cells of all sizes.
+// In a grid of 131072^3 voxels, no ray passes through a wall that is one voxel thick. The rays come
+// from all angles, and also hit edges and corners of cells of all sizes.
 TEST(RayCaster, SeesNoCracksAtHighResolution) {
   constexpr uint64_t kSeed = 7;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
@@ -137,7 +137,8 @@ TEST(RayCaster, SeesNoCracksAtHighResolution) {
   }
 }
 
-// A cell that is no wider than the ray's cone counts as solid. The cone widens with the distance.
+// The caster treats a cell that is not wider than the ray's cone as solid. The first number of the
+// cone is its width at the origin; the second is its growth per distance.
 TEST(RayCaster, EndsAtTheConesWidth) {
   const VoxelScene scene(6, {{63, 63, 63}});
   const DagView dag = scene.view();
@@ -153,7 +154,7 @@ TEST(RayCaster, EndsAtTheConesWidth) {
   EXPECT_EQ(hit.depth, 1u);
 }
 
-// A damaged file gives an error, and no word outside a level is read.
+// Rays through a damaged node give an error; no word outside a level is read.
 TEST(RayCaster, RefusesOffsetsOutsideALevel) {
   const Ray ray{{{-1, 0.5, 0.5}}, {{1, 0, 0}}};
   const auto code_of = [&](uint32_t level, size_t word, uint32_t value) {

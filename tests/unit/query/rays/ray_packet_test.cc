@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kFarAway = 1e30;
 
-// Returns rays in and around a grid of this edge: from one camera, in random directions, along axes
-// and diagonals, and through edges and corners of cells.
+// Returns rays that start in and around a grid of this edge: rays of one camera, random rays, rays
+// along axes and diagonals, and rays through edges and corners of cells.
 std::vector<Ray> many_rays(int edge, uint64_t seed) {
   oracle::Random random(seed);
   const auto anywhere = [&](int64_t low, int64_t high) {
@@ -67,8 +67,8 @@ void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& r
   }
 }
 
-// Checks that all results are bit-identical to the single-ray caster's results, in files of
-// different shapes.
+// Checks that packets give bit-identical results to RayCaster, which casts single rays, in files of
+// different sizes with narrow and wide levels.
 void expect_single_rays(WalkPacket walk) {
   uint64_t hits = 0;
   for (const int edge : {4, 8, 64})
@@ -112,7 +112,8 @@ class DagRays : public testing::Test {
   const DagFile dag_{file_.path()};
 };
 
-// Distances are in voxels for any length of the direction. The normal points against the ray.
+// Distances are in voxels, whatever the length of the direction. The normal of a hit points against
+// the ray.
 TEST_F(DagRays, MeasuresInVoxels) {
   for (const double length : {1e-300, 0.5, 1.0, 1e300}) {
     RayHit hit = cast({-3, 6.5, 7.5}, {length, 0, 0});
@@ -163,7 +164,7 @@ TEST_F(DagRays, RefusesWhatIsNoRay) {
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {1, -1}), ErrorCode::kInvalidInput);
 }
 
-// One thread and four threads find the same hits for more rays than a batch has.
+// For more rays than fit in a batch, one thread and four threads find the same hits.
 TEST_F(DagRays, ThreadsDoNotChangeTheHits) {
   std::vector<Coordinates> origins, directions;
   for (const Ray& ray : many_rays(16, 9))

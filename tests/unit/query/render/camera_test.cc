@@ -29,8 +29,8 @@ void project(const Placement& p, const Vec& point, int width, int height, double
   y = height / 2.0 - dot(d, up) * scale;
 }
 
-// The ray through the center of the picture points to the target. The angle to the rays at the
-// upper and lower edges is half the field of view. x increases to the right, y downward.
+// The ray through the center of the picture points to the target. Rays at the upper edge differ
+// from it by half the field of view. x increases to the right, y downward.
 TEST(Camera, RaysFollowTheFieldOfView) {
   const Camera camera({{{0, 0, 10}}, {{0, 0, 0}}, 90}, 200, 100);
   expect_near(camera.ray(100, 50).direction, {{0, 0, -1}});
@@ -53,7 +53,8 @@ TEST(Camera, RefusesInvalidPlacements) {
   EXPECT_THROW(Camera({{{1, 2, 3}}, {{0, 0, 0}}, 0}, 10, 10), Error);
 }
 
-// All points are in the picture. They are centered, and fill the picture in one direction.
+// fit_camera() places all points in the picture, centers them, and fills at least 80 % of the
+// picture's width or height.
 TEST(Camera, FitsThePointsIntoThePicture) {
   std::vector<Vec> points;
   for (int i = 0; i < 8; ++i)
@@ -80,8 +81,8 @@ TEST(Camera, FitsThePointsIntoThePicture) {
   }
 }
 
-// One outlier among thousands of points does not move the camera away. The corners of a cube are
-// not outliers.
+// The camera ignores one outlier among thousands of points, so it is not placed farther away. It
+// does not ignore the corners of a cube.
 TEST(Camera, IgnoresAnOutlier) {
   const auto distance = [](const std::vector<Vec>& points) {
     const Placement p = fit_camera(points, {{1, 0, 0}}, 32, 1);

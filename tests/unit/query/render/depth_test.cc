@@ -59,8 +59,8 @@ TEST(Depth, OfAnEmptySceneIsInfinite) {
   for (const float depth : depth_of(VoxelScene(4, {}), 1).depths) ASSERT_EQ(depth, INFINITY);
 }
 
-// The file has NumPy's format, version 1.0: a magic, the length of the header text, this text, the
-// numbers.
+// The file has the format of NumPy, version 1.0: a signature, the length of the header text, this
+// text, and the numbers.
 TEST(Depth, IsAnArrayForNumpy) {
   const DepthMap map{3, 2, {1, 2, 3, 4, 5, INFINITY}};
   const std::string bytes = encode_npy(map);

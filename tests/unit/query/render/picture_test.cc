@@ -100,7 +100,7 @@ TEST(Renderer, ShowsTheBlockInTheMiddle) {
   int pixels = 0;
   for (int y = 0; y < 30; ++y)
     for (int x = 0; x < 64; ++x) pixels += differs(x, y);
-  // A cube of edge 4 at distance 14 is about 19 pixels wide.
+  // The block is about 19 pixels wide: its edge is 4 voxels, and its distance 14 voxels.
   EXPECT_GT(pixels, 150);
   EXPECT_LT(pixels, 700);
   // The block is neither black nor overexposed.
@@ -114,7 +114,7 @@ TEST(Renderer, ATransparentBackgroundHasAlpha) {
   EXPECT_EQ(encode_png(picture)[25], 6) << "expected RGBA";
   EXPECT_EQ(picture.pixel(32, 24)[3], 255);
   for (int c = 0; c < 4; ++c) EXPECT_EQ(picture.pixel(1, 1)[c], 0);
-  // The shadow on the floor is left out: only pixels of the block are visible.
+  // A transparent background has no floor and no shadow: only pixels of the block are visible.
   int visible = 0;
   for (int y = 0; y < 48; ++y)
     for (int x = 0; x < 64; ++x) visible += picture.pixel(x, y)[3] > 0;

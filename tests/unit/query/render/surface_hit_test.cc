@@ -42,8 +42,8 @@ TEST(SurfaceHit, NormalOfAWall) {
   }
 }
 
-// Stairs of single voxels look like a slope of 45 degrees if a voxel is as small as a pixel. They
-// look like stairs if a voxel is many pixels wide.
+// From far away, where a voxel is as small as a pixel, the normal of stairs is the normal of a
+// slope of 45 degrees. From nearby, where a voxel is many pixels wide, it is the normal of a step.
 TEST(SurfaceHit, StairsAreASlopeFromAfar) {
   std::set<VoxelScene::Voxel> voxels;
   for (int64_t x = 0; x < 32; ++x)
@@ -68,7 +68,8 @@ TEST(SurfaceHit, ALoneVoxelShowsItsFace) {
   EXPECT_LT(degrees_between(s.normal, {{0, 1, 0}}), 0.1);
 }
 
-// In this small grid the box is exact, because the cells that determine it are voxels.
+// occupied_box() is exact in a small grid, where it is computed from voxels instead of coarser
+// cells.
 TEST(Bounds, AreTheOccupiedVoxels) {
   const VoxelScene scene(5, {{3, 9, 30}, {20, 10, 1}, {4, 4, 4}});
   const Box box = occupied_box(scene.view());
@@ -81,8 +82,8 @@ TEST(Bounds, AreTheOccupiedVoxels) {
   EXPECT_EQ(occupied_cells(scene.view()).centers.size(), 3u);
 }
 
-// If a scene is small in its grid, a view shows the complete scene, and the scene fills most of the
-// picture.
+// Each named view except "inside" shows the complete scene, and the scene fills most of the
+// picture, even if it is small in its grid.
 TEST(Views, OfASmallSceneShowIt) {
   for (const uint32_t grid_levels : {3u, 10u})
     for (const int edge : {1, 4}) {
@@ -107,8 +108,8 @@ TEST(Views, OfASmallSceneShowIt) {
     }
 }
 
-// The view "auto" of an object is from outside. The view "auto" of a furnished room with outer
-// walls is from within.
+// The view "auto" places the camera outside an object, but inside a furnished room with outer
+// walls.
 TEST(Views, RoomsAreSeenFromWithin) {
   const VoxelScene object(5, shell({8, 8, 8}, {23, 23, 23}));
   auto voxels = shell({0, 0, 0}, {63, 63, 63});

@@ -1,4 +1,4 @@
-// The work for named views is limited for any scene, and can be canceled.
+// The time to compute named views is limited for any scene, and the computation can be canceled.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -52,7 +52,8 @@ TEST(RayCaster, StopsAfterItsSteps) {
   EXPECT_FALSE(caster.cast(ray, {}, 0, 4 * edge, limited_hit, left));
 }
 
-// Without a limit, these views would take minutes. With it, the result is the same every time.
+// Without a limit, this view would take minutes. With the limit, it takes seconds, and its camera
+// is still inside the grid.
 TEST(Views, OfDustTakeAFewSeconds) {
   const VoxelScene scene = dust();
   const DagView dag = scene.view();
@@ -80,7 +81,7 @@ TEST(Views, CanBeStopped) {
             ErrorCode::kCanceled);
 }
 
-// Several views of one scene, computed together, equal the views that are computed separately.
+// Computing several views of a scene together gives the same views as computing each of them.
 TEST(Views, AreTheSameTogether) {
   const VoxelScene scene(6, {{4, 4, 4}, {9, 58, 7}, {44, 12, 50}, {60, 1, 3}});
   const DagView dag = scene.view();

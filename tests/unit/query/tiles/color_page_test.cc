@@ -19,7 +19,7 @@ using query::ColorPages;
 using Color3 = SectionDecoder::Color3;
 using Words = std::vector<uint32_t>;
 
-// Decodes a color of a block of 16 bytes, as docs/format.md describes it.
+// Decodes color `i` of a color block, which has 16 bytes, as docs/format.md describes it.
 Color3 color_in_block(const uint32_t* block, uint32_t i) {
   const auto byte = [&](uint32_t at) { return block[at / 4] >> 8 * (at % 4) & 255; };
   Color3 color;
@@ -134,8 +134,8 @@ TEST_F(ColorPagesTest, OfWhatIsNotThereAreEmptyOrRefused) {
   EXPECT_EQ(refusal({6, {0, 0, 0}}), ErrorCode::kNotFound);
 }
 
-// If a color section does not match the DAG, the result is an error or wrong colors, but never a
-// crash.
+// Encoding pages of a color section that does not match the DAG gives an error or wrong colors, but
+// never crashes.
 TEST_F(ColorPagesTest, OfDamagedColorsAreErrors) {
   const ColoredScene scene{8, 8, random_codes(3, 8, 1500), smooth_colors(8, 3)};
   write_colored(path_, scene);

@@ -18,7 +18,8 @@ using Words = std::vector<uint32_t>;
 
 constexpr uint32_t kLevels = 9, kColorLevels = 9, kDepth = 3;
 
-// A file with several blocks of 64 KiB, its tiles of two levels, and some of its color pages.
+// A file of several checksum blocks of 64 KiB. Tests encode up to 60 of its tiles, of three levels
+// each, and some of its color pages.
 class DamagedBlocks : public testing::Test {
  protected:
   void SetUp() override {
@@ -39,8 +40,8 @@ class DamagedBlocks : public testing::Test {
     ASSERT_GT(file->checksum_table_offset(), 4 * 65536u);
   }
 
-  // Returns all tiles, then all pages; empty contents if a block is damaged. Any other exception
-  // fails the test.
+  // Encodes all tiles, then all pages. The contents are empty where a damaged block is found. Any
+  // other exception fails the test.
   std::vector<Words> read(bool with_checks) {
     const auto file = open_global_file(path_);
     const query::DagView dag(*file);
@@ -92,7 +93,8 @@ TEST_F(DamagedBlocks, AreFoundBeforeTheyAreUsed) {
   EXPECT_GT(made, 1000u);
 }
 
-// A damaged block is verified again at its next use, so a repaired file works without a restart.
+// The result that a block is damaged is not stored: the block is verified again at its next use, so
+// a repaired file works without a restart.
 TEST_F(DamagedBlocks, AreComparedUntilTheyAreIntact) {
   const auto file = open_global_file(path_);
   const CheckedBlocks blocks(*file);

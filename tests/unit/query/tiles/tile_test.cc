@@ -47,7 +47,8 @@ struct Tile {
   size_t leaf_words, leaves, leaf_count;
 };
 
-// Returns the word offset of a child, using the reader of the file instead of the tile encoder.
+// Returns the word offset of a child according to the file's reader, without the code of the tile
+// encoder.
 uint64_t child_offset(const File& file, uint32_t level, uint64_t offset, int index) {
   return File::child(file.node(level, offset), index);
 }
@@ -76,7 +77,7 @@ uint64_t expected_coarse(const File& file, uint32_t level, uint64_t offset) {
   return mask;
 }
 
-// Compares a tile with the file, node by node from its root.
+// Compares each node of a tile, from the root down, with the file's node.
 class Comparison {
  public:
   Comparison(const File& file, const Tile& tile) : file_(file), tile_(tile) {}
@@ -190,7 +191,7 @@ TEST(Tile, IsTheExampleOfTheDocuments) {
   EXPECT_EQ(encode_tile(DagView(file), 3, {0, 0}), expected);
 }
 
-// Each tile equals the part of the file below its root. Independent code decodes the tile.
+// An independent decoder finds in each tile the nodes of the file below the tile's root.
 TEST(Tile, EqualsTheFile) {
   for (const int edge : {8, 16, 64, 128})
     for (const uint64_t seed : {1, 2})
@@ -220,7 +221,8 @@ TEST(Tile, OfABrickOrAnEmptySceneIsRefused) {
               ErrorCode::kInvalidInput);
 }
 
-// True if the address gives a tile. Checks the tile's size.
+// True if encode_tile() makes a tile for the address; false if it fails. The decoder checks the
+// tile's size.
 bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   try {
     const Tile tile(encode_tile(dag, depth, root));
@@ -231,8 +233,8 @@ bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   }
 }
 
-// A request may name any word of a level. The answer is a tile or an error. For the offset of a
-// node, it is always the tile of this node.
+// A request may contain any word offset. encode_tile() gives a tile or an error, and always a tile
+// if a node is at this offset.
 TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   const QueryFile scene(voxdag::random_voxels(5, 64));
   const File file(scene.path());
@@ -251,7 +253,7 @@ TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   EXPECT_GT(refused, 50u);
 }
 
-// For a damaged file, which may contain any words, encode_tile() gives a tile or an error.
+// For a file with damaged words, encode_tile() gives a tile or an error.
 TEST(Tile, ADamagedFileIsAnError) {
   std::set<VoxelScene::Voxel> voxels;
   oracle::Random random(7);
