@@ -128,7 +128,7 @@ TEST_F(KilledService, FinishesEveryJob) {
     usleep(static_cast<useconds_t>(pause_us(random)));
     ASSERT_EQ(end(SIGKILL), -SIGKILL);
     start();
-    if (state(jobs_.back().id) == "succeeded") post_jobs();  // each round must interrupt one
+    if (state(jobs_.back().id) == "succeeded") post_jobs();  // each round must interrupt a job
   }
   std::map<int, std::string> expected;  // SHA-256 by resolution
   for (const auto& [id, resolution] : jobs_) {

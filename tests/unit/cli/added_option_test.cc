@@ -1,5 +1,5 @@
-// If an option is added to the description of a struct, it appears on the command line, in JSON, in
-// the schema and among the Python keywords, without any other change.
+// Adds an option to the fields of a struct (core/fields). It then appears on the command line, in
+// JSON, in the schema and among the Python keywords, without any other change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -107,8 +107,8 @@ TEST(AddedOption, IsAPythonKeyword) {
   EXPECT_THAT(writer.members, HasSubstr("    backend: Optional[Literal[\"auto\", \"cpu\""));
 }
 
-// Finds the options in the public C++ header, where a member's name may end with a unit, such as
-// cache_bytes.
+// Expects that the public C++ header has a member for each option. The member's name may end with a
+// unit or a kind, such as cache_bytes.
 struct MemberFinder {
   template <class T>
   void operator()(const Field& field, T&) {

@@ -19,8 +19,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Runs `command` in a child process that catches signals, and sends it SIGTERM. Returns the exit
-// status.
+// Runs `command` in a child process that has just received SIGTERM, whose handler cancels the
+// command's token. Returns the exit status of the process.
 int interrupted(const std::function<void(CancelToken& cancel)>& command) {
   const pid_t child = fork();
   if (child == 0) {
@@ -39,8 +39,8 @@ void sleep_for_seconds(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
 }
 
-// A command ends within 10 s of the signal even if it never checks for cancellation. Its status is
-// 130, and its temporary files are removed.
+// A command that never checks its CancelToken ends within 10 s of the signal. Its status is 130,
+// and its temporary files are removed.
 TEST(Signals, EndACommandThatDoesNotStop) {
   const TemporaryFolder folder;
   const std::string file = folder.file("out.partial"), work = folder.file("work");

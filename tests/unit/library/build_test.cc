@@ -1,4 +1,5 @@
-// Uses the public headers as a program does: builds from arrays, hooks, errors and queries.
+// Uses only the public headers, as other programs do: builds from arrays, hooks, errors and
+// queries.
 #include "voxdag/build.h"
 
 #include <gtest/gtest.h>
@@ -87,7 +88,7 @@ TEST_F(LibraryBuild, AMeshEqualsItsFile) {
   EXPECT_TRUE(dag.has_colors());
 }
 
-// Numbers that floats hold exactly give the same file as doubles.
+// Coordinates that floats represent exactly give the same file as floats and as doubles.
 TEST_F(LibraryBuild, Floats) {
   const std::vector<double> doubles = {0, 0, 0, 4, 0, 0.5, 4, 4, 1};
   const std::vector<float> floats(doubles.begin(), doubles.end());
