@@ -1,4 +1,5 @@
-// Regression tests for defects that were found by attacks on builds.
+// Regression tests for defects that were found by attacking builds: with hostile files and folders,
+// full disks, and concurrent builds.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -51,7 +52,7 @@ class BuildProtection : public testing::Test {
 };
 
 // A killed build holds its locks until the system has removed its process. The next build waits for
-// each lock, and reports that it waits.
+// the lock of the output or of the work folder, and reports that it waits.
 TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   for (const std::string& path : {OutputLock::path_of(output()), output() + ".work/lock"}) {
     SCOPED_TRACE(path);
@@ -69,7 +70,8 @@ TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   }
 }
 
-// If a lock is not released in time, the error is transient, so the service retries the job.
+// If a lock is not released in time, the build fails with kIo, a transient error, so that the
+// service tries the job again.
 TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
   BuildSpec impatient = spec();
   impatient.run.lock_wait_s = 0.1;
@@ -113,8 +115,8 @@ TEST_F(BuildProtection, TrianglesThatFitNowhereAreRefusedBeforeTheyAreRead) {
   EXPECT_NO_THROW(plan_build(tight, context()));
 }
 
-// A build leaves min_free_bytes of the disk free. If it cannot, it ends as on a full disk, and
-// continues later.
+// A build stops with kNoSpace before less than min_free_bytes of the disk are free. It can be
+// resumed when more space is free.
 TEST_F(BuildProtection, TheReserveStopsABuildThatResumes) {
   BuildSpec reserved = spec();
   reserved.run.force = true;
@@ -131,8 +133,8 @@ TEST_F(BuildProtection, TheReserveStopsABuildThatResumes) {
   EXPECT_NO_THROW(run_build(reserved, context()));
 }
 
-// The estimate of `plan` decides at any resolution whether a build starts, and it counts the
-// reserve as used.
+// At any resolution, a build is refused if its estimated disk space exceeds the free space. The
+// reserve, min_free_bytes, does not count as free.
 TEST_F(BuildProtection, SmallBuildsAreRefusedByTheEstimateToo) {
   files_.free_bytes = 1'000'000'000;
   BuildSpec small = spec();
@@ -145,7 +147,8 @@ TEST_F(BuildProtection, SmallBuildsAreRefusedByTheEstimateToo) {
   EXPECT_EQ(plan_build(small, context()).free_disk, 1000u);
 }
 
-// Two folders are on the same disk if their devices are equal; equal free space does not matter.
+// Two folders count as one disk if they have the same device. The estimated disk space of a build
+// is then one sum; otherwise it is compared with each disk.
 TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   BuildSpec large = spec();
   large.geometry.resolution = 4096;
@@ -156,8 +159,8 @@ TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   EXPECT_NE(refusal().find("the build's work folder is"), std::string::npos) << refusal();
 }
 
-// The second build waits for the lock of its output while the first build publishes its file. The
-// lock's file must still have its name, so that a third build also waits.
+// While a build waits for the lock of its output, another build publishes the output. The lock file
+// must keep its name during this, so that a third build also waits for it.
 TEST_F(BuildProtection, ALockOfTheOutputHasAName) {
   auto first = std::make_unique<OutputLock>(files_, output());
   std::unique_ptr<OutputLock> second;
@@ -199,15 +202,15 @@ TEST_F(BuildProtection, ABuildHoldsItsOutputUntilItEnds) {
   EXPECT_FALSE(std::filesystem::exists(OutputLock::path_of(output())));
 }
 
-// A file with the lock's name is kept if voxdag did not create it.
+// A build keeps a file at the path of its lock file if another program created it.
 TEST_F(BuildProtection, AForeignFileOfTheLocksNameStays) {
   std::ofstream(OutputLock::path_of(output())) << "mine";
   run_build(spec(), context());
   EXPECT_EQ(read_small_file(files_, OutputLock::path_of(output()), 10), "mine");
 }
 
-// If a work folder contains a symbolic link or a pipe, a build does not write through it to a file
-// that it does not own.
+// A build refuses a work folder in which a symbolic link or a pipe has the name of one of its
+// files. It does not write through the link.
 TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
   const std::string victim = folder_.file("victim.txt"), work = output() + ".work";
   std::ofstream(victim) << "precious";
@@ -228,8 +231,8 @@ TEST_F(BuildProtection, LinksInTheWorkFolderAreNotFollowed) {
   EXPECT_EQ(error_of([&] { run_build(spec(), context()); }).code(), ErrorCode::kInvalidInput);
 }
 
-// A plan creates a new temporary folder that only its user can read. If someone else has already
-// created a folder with a similar name, the plan does not use it.
+// A plan creates a new temporary folder that only its user can read. It does not use a folder with
+// a similar name, because another user could have prepared it.
 TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
   const std::string temporary = folder_.file("tmp"), victim = folder_.file("victim.txt");
   const std::string foreseen = temporary + "/voxdag-plan-" + std::to_string(getpid());
@@ -265,8 +268,8 @@ TEST_F(BuildProtection, APlanTakesAFolderOfItsOwn) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temporary), {}), 1);
 }
 
-// If rows of the job store are lost, the build fails. It must not write a file that lacks the
-// voxels of these rows.
+// If rows of subvolumes are missing in the job store, the build fails, because its file would lack
+// their voxels. With --restart it starts over.
 TEST_F(BuildProtection, ABuildNoticesMissingRows) {
   const std::string expected = run_build(spec(), context()).sha256;
   std::filesystem::remove(output());
@@ -290,8 +293,8 @@ TEST_F(BuildProtection, ADamagedJobStartsOver) {
   EXPECT_EQ(run_build(again, context()).subvolumes_reused, 0u);
 }
 
-// If files of the scene have the same names as files of the build, the build refuses the scene and
-// keeps its files.
+// If a file of the scene has a path at which the build would write its own files, the build refuses
+// the scene and keeps the file.
 TEST_F(BuildProtection, ABuildDoesNotDestroyItsScene) {
   BuildSpec inside = spec();
   inside.run.work_folder = folder_.file("w");

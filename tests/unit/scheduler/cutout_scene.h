@@ -1,4 +1,5 @@
-// A scene of many quads whose image, in a separate file, cuts out parts of them.
+// A scene of many quads with one image, in a separate file, whose transparent texels cut out parts
+// of the quads.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 namespace voxdag {
 
-// Writes FOLDER/leaf.png. One column of texels in every `period` columns is hidden.
+// Writes FOLDER/leaf.png. In every `period` columns of texels, one is transparent.
 inline void write_leaf_image(const std::string& folder, int period) {
   constexpr int kSize = 16;
   std::string pixels;

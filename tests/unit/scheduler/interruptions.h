@@ -12,7 +12,7 @@
 
 namespace voxdag {
 
-// Cancels the build once the stage `stage` has done `after` units.
+// Cancels the build when the stage `stage` has reported `after` units of work.
 class CancelingProgress : public NoProgress {
  public:
   CancelingProgress(CancelToken& cancel, std::string stage, uint64_t after)
@@ -34,7 +34,7 @@ class CancelingProgress : public NoProgress {
   uint64_t left_;
 };
 
-// Runs a build and cancels it once `stage` has done `after` units.
+// Runs a build until `stage` has reported `after` units of work, then cancels it.
 inline void build_until(const BuildSpec& spec, const std::string& stage, uint64_t after,
                         FileSystem& files = system_files()) {
   CancelToken cancel;

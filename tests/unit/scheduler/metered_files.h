@@ -1,6 +1,6 @@
-// The file system of the machine, with counters of reads and writes, and a simulated disk that is
-// full or fails on request. Syncs are only counted, because no test cuts the power. Tests read the
-// counters only while no build runs.
+// The file system of the machine. Counts reads, writes and syncs by path, and simulates a full disk
+// or a failing sync on request. Not thread-safe for the test: read the counters only while no build
+// runs.
 #pragma once
 
 #include <algorithm>
@@ -23,10 +23,10 @@ class MeteredFiles : public ForwardingFiles {
   std::map<std::string, uint64_t> bytes_written;   // by path
   std::map<std::string, uint64_t> bytes_released;  // by path
   std::map<std::string, uint64_t> syncs;           // by path
-  std::map<std::string, uint64_t> failing_sync;    // by path: the sync, from 1, that fails with kIo
-  std::string full_for;                            // writes to this file fail as on a full disk
+  std::map<std::string, uint64_t> failing_sync;    // by path: number of the sync that fails, from 1
+  std::string full_for;                            // path of a file whose writes fail with kNoSpace
   uint64_t free_bytes = UINT64_MAX;
-  std::string other_disk;  // a folder on a separate disk
+  std::string other_disk;  // path of a folder that reports its own device
 
   void forget_counts() {
     bytes_read.clear();

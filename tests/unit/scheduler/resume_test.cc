@@ -51,7 +51,8 @@ class ResumeTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Records for each stage: the units done when it resumed, the units done so far, and the total.
+// Records for each stage: the units of work that were done when it began, the units done so far,
+// and the total.
 class StageRecord : public NoProgress {
  public:
   struct Stage {
@@ -103,8 +104,8 @@ TEST_F(ResumeTest, ProgressIsThatOfTheWholeBuild) {
   }
 }
 
-// A build that was canceled in any stage is resumed by the same call. It reuses the built
-// subvolumes and gives the same bytes. Afterwards, the work folder does not exist.
+// The same call resumes a build that was canceled in any stage. It reuses the built subvolumes,
+// gives the same bytes, and then removes the work folder.
 TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   const std::string expected = build(spec()).sha256;
   std::filesystem::remove(output());
@@ -128,8 +129,9 @@ TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   }
 }
 
-// A build with a different scene, resolution or hash is refused, unless it is to start over. The
-// error names the difference. Run options may change between the runs.
+// A build with a different scene, resolution or number of hash bits does not resume the job in the
+// work folder: it fails, and the error names the difference. With `restart`, it starts over. Run
+// options may differ.
 TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   build_until(spec(), "build", 5);
   BuildSpec other = spec();
@@ -186,8 +188,8 @@ TEST_F(ResumeTest, RebuildsDamagedArtifacts) {
   }
 }
 
-// Only one build can use a work folder. A second build gets an error that names the first. Files
-// not created by voxdag are not changed.
+// A second build in the same work folder fails, and its error names the process of the first. A
+// work folder that also contains a file of another program is refused, and the file is kept.
 TEST_F(ResumeTest, OwnsItsFolderAlone) {
   {
     CancelToken cancel;
@@ -211,8 +213,8 @@ TEST_F(ResumeTest, OwnsItsFolderAlone) {
   EXPECT_TRUE(std::filesystem::exists(work() + "/letter.txt"));
 }
 
-// A folder that has the name of the work folder but was not created by voxdag is refused and kept
-// unchanged.
+// If the path of the work folder is a folder of another program, the build fails and does not
+// change this folder.
 TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   std::filesystem::create_directories(work() + "/merge");
   std::ofstream(work() + "/merge/thesis.txt") << "not ours";
@@ -221,7 +223,7 @@ TEST_F(ResumeTest, RefusesAForeignFolderOfOurName) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(work()), {}), 1);
 }
 
-// A process that holds the lock briefly to read the status does not prevent a build.
+// `status` holds the lock of the work folder briefly. A build waits for it instead of failing.
 TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   std::filesystem::create_directories(work());
   auto looking = system_files().try_lock(work() + "/lock");
@@ -235,8 +237,8 @@ TEST_F(ResumeTest, WaitsForThoseWhoLook) {
   EXPECT_EQ(sha256.size(), 64u);
 }
 
-// Two builds with separate work folders cannot write to one output. The first build's unfinished
-// file is not changed.
+// While one build holds the lock of an output, another build with another work folder cannot write
+// this output. Afterwards the interrupted first build can be resumed.
 TEST_F(ResumeTest, OwnsItsOutputAlone) {
   BuildSpec first = spec();
   first.run.work_folder = folder_.path() + "/first";
@@ -252,8 +254,8 @@ TEST_F(ResumeTest, OwnsItsOutputAlone) {
   EXPECT_GT(build(first).subvolumes_reused, 0u);
 }
 
-// After the merge has begun, the output of a build cannot be changed: the resumed merge writes to
-// the file in which it has begun.
+// A build whose merge has begun cannot be resumed with another output, because the merge continues
+// in the output file that it has begun.
 TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
   BuildSpec checkpointed = spec();
   checkpointed.run.work_folder = folder_.path() + "/work";
@@ -270,7 +272,7 @@ TEST_F(ResumeTest, KeepsTheOutputOfAMergeThatBegan) {
 // If a work folder cannot be created or written, the error names the folder, and no work is done.
 TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
   BuildSpec nowhere = spec();
-  nowhere.run.work_folder = scene() + "/work";  // below a file
+  nowhere.run.work_folder = scene() + "/work";  // not a folder: its parent is a file
   try {
     build(nowhere);
     FAIL() << "built without a work folder";
@@ -280,8 +282,8 @@ TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));
 }
 
-// A job of another version of voxdag is refused with the version's number, unless the build is to
-// start over.
+// A job store, or a job in it, of another version of voxdag is refused, and the error names the
+// version. With `restart`, the build starts over.
 TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   const std::string expected = build(spec()).sha256;
   for (const bool of_store : {true, false}) {
@@ -309,8 +311,9 @@ TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   }
 }
 
-// If a different file replaces the job store in a voxdag work folder, --restart works. If a folder
-// has only such a file, the file was not created by voxdag, and --restart keeps it.
+// If a database of another program replaces the job store in a voxdag work folder, --restart starts
+// over. If the folder contains only such a database, voxdag did not create the folder, and even
+// --restart keeps the database.
 TEST_F(ResumeTest, StartsOverInAFolderOfItsOwnOnly) {
   build_until(spec(), "build", 5);
   const std::string store = work() + "/job.db";

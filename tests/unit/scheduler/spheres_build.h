@@ -1,5 +1,5 @@
-// The build that tests interrupt: a scene of spheres that is divided into some hundred subvolumes
-// and built by one worker.
+// The build that tests interrupt and resume: a scene of spheres, divided into a few hundred
+// subvolumes and built by one worker.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
-// Warnings about the scene in reports, in resumed builds, and in strict builds.
+// Tests warnings about the scene: in reports, in resumed builds, and in strict builds, where they
+// are errors.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +29,7 @@ class SceneWarnings : public testing::Test {
     spec_.run.keep_work = true;
   }
 
-  // Writes a PLY file with these faces over four vertices.
+  // Writes a PLY file with four vertices. `faces` are the lines of its `count` faces.
   void write_scene(const std::string& faces, int count) {
     spec_.geometry.scenes = {folder_.file("mesh.ply")};
     std::ofstream(spec_.geometry.scenes[0])

@@ -1,4 +1,5 @@
-// Cluster builds whose merge is a job of the cluster. The test simulates Slurm (played_slurm.h).
+// Builds on a cluster that run the merge as another job of Slurm, after the tasks. played_slurm.h
+// simulates Slurm.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -49,10 +50,10 @@ TEST_F(ClusterMergeJob, ItsReportIsThatOfTheCommand) {
   ASSERT_NE(submitted, slurm_.commands.end());
   for (const char* word : {"--mem=1G", "--chdir=/"})
     EXPECT_NE(std::ranges::find(*submitted, word), submitted->end()) << word;
-  // The same command finds the existing result. With --restart or another scene, it builds again.
+  // The same command reuses the result. With --restart or another scene, it builds again.
   slurm_.commands.clear();
   EXPECT_EQ(report_json(build(merging_spec())), report_json(report));
-  EXPECT_EQ(count("sbatch"), 2u);  // tests of the options: of the tasks, and of the merge job
+  EXPECT_EQ(count("sbatch"), 2u);  // sbatch --test-only, for the tasks and for the merge job
   BuildSpec restarted = merging_spec();
   restarted.run.restart = true;
   build(restarted);
@@ -65,7 +66,8 @@ TEST_F(ClusterMergeJob, ATaskThatSlurmHoldsForEverDoesNotHoldItUp) {
   slurm_.fates = {"", PlayedSlurm::kHeld};
   const auto merge = std::exchange(slurm_.merge_job, nullptr);
   slurm_.merge_job = [&] {
-    // The merge job waits for the array of tasks until scancel is called.
+    // Slurm starts the merge job only after the array of tasks has ended. Here this requires
+    // scancel, because Slurm holds a task.
     if (count("scancel") > 0)
       merge();
     else
@@ -132,7 +134,7 @@ TEST_F(ClusterMergeJob, WhoComesBackFollowsAndWhoStopsTheTasksStopsItFirst) {
   };
   const BuildReport report = run_build(merging_spec(), {system_files(), warnings_, never_});
   EXPECT_EQ(report.sha256, expected_);
-  EXPECT_EQ(count("sbatch"), 3u);  // one merge job, and two tests of the options
+  EXPECT_EQ(count("sbatch"), 3u);  // the merge job, and two of sbatch --test-only
   // The merge job has not canceled itself.
   for (const auto& command : slurm_.commands)
     EXPECT_FALSE(command[0] == "scancel" && command[1].ends_with("-merge"));

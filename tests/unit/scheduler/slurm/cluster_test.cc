@@ -29,7 +29,8 @@ TEST_F(Cluster, SameBytesFromAnyNumberOfTasks) {
   }
 }
 
-// With --thin, triangles without area set no voxel, so subvolumes with triangles can be empty.
+// With --thin, triangles without area set no voxels, so a subvolume with triangles can be empty.
+// Builds on the cluster give the bytes of a local build.
 TEST_F(Cluster, SameBytesOfThinBuildsWithEmptySubvolumes) {
   std::ofstream specks(folder_.file("specks.obj"));
   specks << "v 0 0 0\nv 1000 1000 0\nv 0 1000 1000\nf 1 2 3\n";
@@ -116,7 +117,7 @@ TEST_F(Cluster, TooManyFailuresEndTheBuildAndTheNextRunGoesOn) {
 TEST_F(Cluster, ManyBatchesTakeSeveralArrays) {
   slurm_.max_array_size = 10;
   build(spec(25));
-  EXPECT_EQ(count("sbatch"), 1u + 3);  // a test of the options, and three arrays
+  EXPECT_EQ(count("sbatch"), 1u + 3);  // sbatch --test-only, and three arrays
 }
 
 TEST_F(Cluster, WaitsForASlurmThatDoesNotAnswer) {
@@ -165,7 +166,8 @@ TEST_F(Cluster, WaitsForASlurmThatTakesNoTasksNow) {
   EXPECT_NE(warnings_.text.find("Slurm accepts no tasks now"), std::string::npos) << warnings_.text;
 }
 
-// For some seconds after its start Slurm knows no nodes, and refuses tasks that it accepts later.
+// A Slurm that has just been started knows no nodes, and refuses tasks that it accepts some seconds
+// later. The build tries again until slurm_start_s has passed.
 TEST_F(Cluster, WaitsForASlurmThatHasJustBeenStarted) {
   slurm_.test_refusal = "allocation failure: Requested node configuration is not available";
   slurm_.refusal = "Batch job submission failed: Requested node configuration is not available";
@@ -192,8 +194,9 @@ TEST_F(Cluster, AnArrayThatIsTooLargeForSlurmIsHalved) {
   EXPECT_NE(warnings_.text.find("QOSMaxSubmitJobPerUserLimit"), std::string::npos);
 }
 
-// If the state of the cluster build is lost or has a different version, built subvolumes are still
-// reused. New segments get new numbers, because rows of the job store name the existing segments.
+// If cluster.json is lost or of another version of voxdag, the build still reuses subvolumes that
+// are built. New segments get unused numbers, because rows of the job store refer to the existing
+// segments.
 TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   for (const bool is_lost : {true, false}) {
     SCOPED_TRACE(is_lost);
@@ -213,7 +216,8 @@ TEST_F(Cluster, ALostStateCostsNothingThatIsBuilt) {
   }
 }
 
-// A build does not use batches that were made for another plan of the same scene.
+// A build does not use the batches of a different plan of the same scene, even if their files are
+// in its cluster folder.
 TEST_F(Cluster, BatchesOfAnotherPlanAreNotTakenOver) {
   BuildSpec fine = spec(4);
   fine.run.cluster->max_retries = 0;
@@ -260,7 +264,8 @@ TEST_F(Cluster, ThisMachineTakesOverWhatTasksHaveBuilt) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
 }
 
-// If the file of a batch is damaged, the next run makes the batch again.
+// If the file with the triangles of a batch is damaged, the build fails, and the next run writes
+// this file again.
 TEST_F(Cluster, ADamagedBatchIsCutAgain) {
   BuildSpec hasty = spec(2);
   hasty.run.cluster->max_retries = 1;
@@ -273,7 +278,8 @@ TEST_F(Cluster, ADamagedBatchIsCutAgain) {
   EXPECT_GT(build(hasty).subvolumes_reused, 0u);
 }
 
-// If a task times out while no process follows the build, the next run notices the timeout.
+// A task reaches its time limit after the build was canceled. The next run of the same command
+// finds the timeout, and splits the batch.
 TEST_F(Cluster, ATimeoutIsNoticedByTheNextRun) {
   BuildSpec two = spec(2);
   slurm_.fates = {"", "TIMEOUT"};
@@ -289,7 +295,8 @@ TEST_F(Cluster, ATimeoutIsNoticedByTheNextRun) {
   EXPECT_NE(warnings_.text.find("TIMEOUT; it is split"), std::string::npos) << warnings_.text;
 }
 
-// A split after a timeout does not count as a failure.
+// Timeouts, after which a batch is split, and preemptions do not count as failures, so they do not
+// use up max_retries.
 TEST_F(Cluster, SplitsDoNotUseUpTheRetries) {
   BuildSpec strict = spec(1);
   strict.run.cluster->max_retries = 0;
@@ -307,8 +314,8 @@ TEST_F(Cluster, LeftoversThatCannotBeRemovedDoNotStopABuild) {
   EXPECT_EQ(report.sha256, expected_);
 }
 
-// A killed task leaves its temporary folder. The next task removes this folder. It does not remove
-// the folder of a running task, or a folder that other users can write.
+// The next task removes the temporary folder that a killed task has left. It keeps the folder of a
+// running task, which is locked, and a folder that other users can write.
 TEST_F(Cluster, TemporaryFoldersOfKilledTasksAreRemoved) {
   const std::string killed = folder_.file("tmp/voxdag-batch-killed");
   const std::string running = folder_.file("tmp/voxdag-batch-running");
@@ -382,7 +389,7 @@ TEST_F(Cluster, ADamagedSegmentIsBuiltAgain) {
   slurm_.before_task = [&](uint32_t batch) {
     if (batch != 2 || was_damaged) return;
     was_damaged = true;
-    // Batches 0 and 1 are built; the frames of one of them lose their first bytes.
+    // Batches 0 and 1 are built. Damages the first bytes of the frames of one of them.
     for (const auto& entry : std::filesystem::directory_iterator(output() + ".work/cluster"))
       if (entry.path().filename().string().starts_with("attempt-0-"))
         for (const auto& segment : std::filesystem::directory_iterator(entry.path())) {
@@ -401,7 +408,8 @@ TEST_F(Cluster, AnotherAttemptFindsTheRecord) {
   slurm_.before_task = [&](uint32_t) {
     slurm_.before_task = nullptr;
     CancelToken never;
-    // The second attempt at batch 0 finds the record of the first.
+    // A second attempt at batch 0 finds the completion record of the first, and does not build
+    // again.
     const BatchRun run{.work_folder = output() + ".work",
                        .batch = 0,
                        .program = kVersion,

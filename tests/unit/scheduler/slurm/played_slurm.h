@@ -1,5 +1,5 @@
-// A simulated Slurm, whose tasks run in the process of the test and end as the test specifies. Also
-// the fixture of the tests that build with it.
+// Simulates Slurm: tasks run in the process of the test, and end as the test specifies. Also has
+// the fixture of tests that build with the simulated Slurm.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,25 +27,26 @@ namespace voxdag {
 
 inline constexpr const char* kVersion = "1.2.3";
 
-// Runs each task immediately. A task with a fate does nothing and ends in that state; a task with
-// the fate kHeld waits until it is canceled.
+// Answers the commands sbatch, squeue, scontrol and scancel. sbatch runs each task immediately,
+// unless the next entry of `fates` is a state: then the task does nothing and ends in this state.
+// With the fate kHeld, it is pending until scancel.
 class PlayedSlurm : public CommandRunner {
  public:
   static constexpr const char* kHeld = "held";
-  std::deque<std::string> fates;  // states of the next tasks; "" for a task that succeeds
+  std::deque<std::string> fates;  // one per task, in order; "": it runs
   uint32_t max_array_size = 1001;
   size_t max_tasks = SIZE_MAX;  // largest array that sbatch accepts
   int squeue_failures = 0;
-  std::string refusal;       // error text of sbatch; "" for none
-  int refusals = INT_MAX;    // number of calls of sbatch that fail
+  std::string refusal;       // error text of sbatch; "": it accepts tasks
+  int refusals = INT_MAX;    // calls of sbatch that fail with `refusal`
   std::string test_refusal;  // error text of sbatch --test-only
   int test_refusals = INT_MAX;
   std::vector<std::vector<std::string>> commands;
   std::string program = kVersion;
   std::string temporary_folder;
   std::function<void(uint32_t batch)> before_task;
-  std::function<void()> merge_job;           // the work of the merge job
-  std::string waiting_merge_job;             // id of the merge job; "" unless it waits
+  std::function<void()> merge_job;           // does the work of the merge job
+  std::string waiting_merge_job;             // id of the merge job while it waits; else ""
   std::string merge_state = "RUNNING|None";  // state of the merge job before its end
   std::string merge_end = "COMPLETED Reason=None ExitCode=0:0";
 
@@ -80,7 +81,8 @@ class PlayedSlurm : public CommandRunner {
   }
 
  private:
-  // At a query, the merge job runs completely and ends, unless it makes itself wait again.
+  // Answers squeue about the merge job. If the job waits, runs merge_job(). The job has then ended,
+  // unless merge_job() sets waiting_merge_job again.
   CommandResult show_merge_job() {
     if (waiting_merge_job.empty()) return ok("");
     const std::string id = std::exchange(waiting_merge_job, "");

@@ -1,5 +1,5 @@
-// Files in the shared folder of a cluster build that no task of the build wrote. The build rejects
-// them and continues.
+// Another program writes files to the shared folder of a cluster build that look like results of
+// its tasks. The build rejects them with a warning, and continues.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -17,8 +17,9 @@ namespace {
 class SharedFolder : public Cluster {
  protected:
   std::string cluster(const std::string& name) const { return output() + ".work/cluster/" + name; }
-  // Builds with two batches. Calls disturb() before the task of batch 1 runs. Then waits for a
-  // warning about the record `name`, and expects the right result.
+  // Builds with two batches. Before the task of batch 1 runs, calls disturb(path) to create a file
+  // `name` in the cluster folder. Expects the right result, and a warning that `name` was rejected,
+  // which contains `warning`.
   void expect_rejected(const std::string& name, const std::string& warning,
                        const std::function<void(const std::string& path)>& disturb) {
     SCOPED_TRACE(name);
@@ -31,7 +32,8 @@ class SharedFolder : public Cluster {
     EXPECT_NE(warnings_.text.find(name + " is rejected: "), std::string::npos) << warnings_.text;
     EXPECT_NE(warnings_.text.find(warning), std::string::npos) << warnings_.text;
   }
-  // Returns a record without voxels of the open batch 1.
+  // Returns a false completion record for batch 1, which is not built yet: all its subvolumes are
+  // empty.
   CompletionRecord empty_record() {
     ClusterState state = *read_cluster_state(system_files(), output() + ".work");
     CompletionRecord record;

@@ -1,5 +1,5 @@
-// Solids and clusters: the merge fills an enclosed solid, and tasks do not fill solids by other
-// rules.
+// Builds of solids on a cluster. An enclosed solid is filled by the merge. Solids by other rules
+// are refused, because tasks cannot fill them.
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"

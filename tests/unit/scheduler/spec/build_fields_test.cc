@@ -12,14 +12,14 @@
 namespace voxdag {
 namespace {
 
-// The help text is a constant, but the file endings come from the table of formats. So this test
-// checks that the text lists all endings.
+// The help text of the scene lists all file endings of the table of formats. It is a constant, so
+// it could become outdated.
 TEST(BuildFields, SceneHelpListsAllEndings) {
   EXPECT_THAT(std::string(kSceneField.help),
               testing::HasSubstr("(" + list_scene_endings(", ", ", ") + ")"));
 }
 
-// Parses a text into the field of this name.
+// Parses `text` into the field with this name, and stores whether the text is valid.
 struct OneOption {
   std::string_view name;
   std::string text;
@@ -34,7 +34,8 @@ struct OneOption {
   void object(const char*, const auto&) {}
 };
 
-// Builds without the option have the same identity as before the option existed.
+// The option `thin` is part of the build's key only if it is set, so that the keys of other builds
+// are the same as before this option existed.
 TEST(BuildFields, ThinIsInTheKeyOnlyIfGiven) {
   GeometryOptions options;
   options.resolution = 64;

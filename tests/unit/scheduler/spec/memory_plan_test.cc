@@ -12,8 +12,8 @@ constexpr uint64_t kMiB = uint64_t{1} << 20, kGiB = uint64_t{1} << 30;
 constexpr uint64_t kBudgets[] = {64 * kMiB, 100'000'000, kGiB, 12 * kGiB};
 constexpr unsigned kThreads[] = {1, 2, 16, 1000};
 
-// Fixes how some budgets are divided, because a change would shift the balance between speed and
-// memory.
+// The division of some budgets is fixed here, so that a change, which would shift the balance
+// between speed and memory, is noticed.
 TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   struct Expected {
     uint64_t budget, top_tree, triangles, partition, pilot;
@@ -29,8 +29,8 @@ TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   }
 }
 
-// Workers get equal shares. If the shares would be too small for any subvolume, the number of
-// workers is reduced.
+// All workers get equal shares. If the shares would be too small for the smallest subvolume, there
+// are fewer workers.
 TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   struct Expected {
     uint64_t free;
@@ -49,7 +49,7 @@ TEST(MemoryPlan, DividesWhatIsFreeBetweenWorkers) {
   }
 }
 
-// A worker's share holds all parts and the worker's retained pages.
+// Sizes of the parts into which a worker divides its share.
 TEST(MemoryPlan, DividesAWorkersShare) {
   EXPECT_EQ(WorkerMemory::key_bytes(64 * kMiB), 56 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(10 * kMiB), 8 * kMiB);
@@ -75,7 +75,7 @@ TEST(MemoryPlan, DividesTheMergesBudget) {
   EXPECT_EQ(large.partition_bytes, 5 * kGiB - 5 * kGiB / 16);
 }
 
-// The parts that are in use at the same time fit in the budget.
+// Parts of the budget that are in use at the same time fit in the budget together.
 TEST(MemoryPlan, PartsFitTheWhole) {
   for (const uint64_t budget : kBudgets) {
     const MemoryPlan plan = MemoryPlan::divide(budget);

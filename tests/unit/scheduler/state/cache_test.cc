@@ -29,8 +29,8 @@ class CacheTest : public testing::Test {
     grid_ = build(spec()).grid;
   }
 
-  // Adds a triangle whose edges are a hundredth of the scene's edge. Its node is moved by `steps`
-  // of these edges.
+  // Writes chair.gltf, a triangle whose edges are a hundredth of the edge of the grid. Its node is
+  // moved by `steps` times this length.
   void write_chair(double steps) const {
     const double edge = grid_.edge / 100;
     const auto number = [](double value) { return std::to_string(value); };
@@ -75,8 +75,8 @@ class CacheTest : public testing::Test {
   Grid grid_;
 };
 
-// One node of the scene is moved. The cache provides all subvolumes except the few that the node
-// has left or entered. A build without a cache gives the same bytes.
+// After one node of the scene is moved, the cache provides all subvolumes except the few that the
+// node has left or entered. A build without a cache gives the same bytes.
 TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   const std::string cache = folder_.file("cache");
   write_chair(0);
@@ -92,8 +92,8 @@ TEST_F(CacheTest, AMovedNodeCostsItsOwnSubvolumes) {
   EXPECT_LT(second.subvolumes_reused, second.subvolumes);
 }
 
-// A damaged entry is built again. The cache never exceeds its limit. Files that a killed build has
-// left in the cache are removed.
+// A build does not use damaged entries of the cache. It keeps the cache within its limit, and
+// removes partial files of killed builds.
 TEST_F(CacheTest, DamageLimitAndLeftovers) {
   const std::string cache = folder_.file("cache");
   write_chair(0);
@@ -128,7 +128,8 @@ TEST_F(CacheTest, DamageLimitAndLeftovers) {
   EXPECT_LE(bytes, limited.run.cache_bytes);
 }
 
-// Replaces random entries of a cache by things that no build has written, until it is destroyed.
+// Until it is destroyed, damages random entries of a cache, or replaces them with links, pipes,
+// folders and entries of other subvolumes.
 class CacheAttack {
  public:
   CacheAttack(std::filesystem::path folder, unsigned seed)
@@ -176,8 +177,8 @@ class CacheAttack {
   std::jthread thread_;  // must be the last member
 };
 
-// Links, pipes, folders, torn, huge and misplaced files in the cache, also those that appear while
-// a build reads or adds entries, neither change the file nor stop the build.
+// Links, pipes, folders, and damaged, huge or exchanged files in the cache neither change the
+// result nor stop the build, even if they appear while the build reads or adds entries.
 TEST_F(CacheTest, SurvivesHostileEntries) {
   write_chair(0);
   const BuildSpec attacked = spec_with_chair(folder_.file("cache"));

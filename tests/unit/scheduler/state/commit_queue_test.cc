@@ -1,5 +1,5 @@
-// The queue makes groups of artifacts durable in the background. It never records a row before the
-// row's bytes are durable.
+// Tests CommitQueue, which syncs groups of artifacts in the background. It never records the row of
+// a subvolume before the bytes of its artifact are durable.
 #include "scheduler/state/commit_queue.h"
 
 #include <gtest/gtest.h>
@@ -119,7 +119,7 @@ class CommitQueueTest : public testing::Test {
     for (const uint64_t before = segment_.size(); segment_.size() - before < kGroup;) build_one();
     disk_.wait_for_syncs(1);
   }
-  // Returns the number of built subvolumes that other processes see.
+  // Returns the number of subvolumes that are recorded as built, as another process sees them.
   size_t recorded() {
     return built_in(JobStore(folder_.file("job.db"), JobStore::Access::kRead).leaves());
   }
@@ -129,7 +129,7 @@ class CommitQueueTest : public testing::Test {
     for (const StoredSubvolume& s : leaves) {
       if (s.state != SubvolumeState::kBuilt) continue;
       ++built;
-      // Throws if the artifact's bytes are not in the file.
+      // Opens the artifact, which throws if its bytes are not in the file.
       ArtifactReader(system_files().open_read(segment_path(folder_.path(), s.artifact.segment)),
                      s.artifact);
     }
@@ -160,7 +160,7 @@ TEST_F(CommitQueueTest, TheWorkerContinuesWhileTheDiskWrites) {
   EXPECT_EQ(recorded(), begun_with + 2);
 }
 
-// If the disk is too slow, the worker waits, so that the current group does not grow without limit.
+// If a sync is slow, the worker waits for it before the next group becomes too large.
 TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   disk_.block_syncs();
   build_a_group();
@@ -177,7 +177,8 @@ TEST_F(CommitQueueTest, WaitsForADiskThatFallsBehind) {
   EXPECT_EQ(recorded(), next_);
 }
 
-// If a sync fails, its group is never recorded. Another sync would succeed although bytes are lost.
+// If a sync fails, the queue never records this group or later ones, even if another sync succeeds:
+// the system may have dropped the bytes that the first sync could not write.
 TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   disk_.fail_next_sync();
   bool reported = false;
@@ -196,7 +197,8 @@ TEST_F(CommitQueueTest, WhatAFailedSyncLostIsNotRecorded) {
   EXPECT_EQ(recorded(), 0u);
 }
 
-// The merge can read the last group immediately. It waits for the disk only on request.
+// finish() announces the last group without a sync, so that the merge can read it immediately.
+// commit() makes the group durable.
 TEST_F(CommitQueueTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
   disk_.block_syncs();
   for (int i = 0; i < 3; ++i) build_one();
@@ -210,7 +212,7 @@ TEST_F(CommitQueueTest, TheLastGroupIsDurableOnlyWhenAskedFor) {
   EXPECT_EQ(recorded(), 3u);
 }
 
-// If one queue fails, the other queues still become durable.
+// If the sync of one queue fails, the artifacts of the other queues are nevertheless recorded.
 TEST_F(CommitQueueTest, FinishedQueuesBecomeDurableEachForItself) {
   CommitQueues queues;
   for (uint32_t id = 1; id <= 3; ++id) {
@@ -228,7 +230,8 @@ TEST_F(CommitQueueTest, FinishedQueuesBecomeDurableEachForItself) {
   EXPECT_EQ(recorded(), 2u);
 }
 
-// Artifacts that become durable while the job store cannot be written are recorded later.
+// If the job store cannot be written, a commit fails, although the artifacts are durable. A later
+// commit records them.
 TEST_F(CommitQueueTest, WhatTheJobStoreCannotStoreIsRecordedLater) {
   SqlDatabase store(folder_.file("job.db"), SqlDatabase::Mode::kReadWrite);
   store.execute(
@@ -244,8 +247,8 @@ TEST_F(CommitQueueTest, WhatTheJobStoreCannotStoreIsRecordedLater) {
   EXPECT_EQ(recorded(), 3u);
 }
 
-// Triangles that a later run could read are released only after their subvolumes are recorded. So
-// finish() waits until the last group is recorded.
+// Triangles in a DurableStore, which a later run could read, are released only after their
+// subvolume is recorded. So finish() waits until the last group is recorded.
 TEST_F(CommitQueueTest, DurableTrianglesStayUntilTheirSubvolumesAreRecorded) {
   DurableStore durable(system_files(), folder_.file("triangles"), {}, folder_.file("spill"), false,
                        budget_);

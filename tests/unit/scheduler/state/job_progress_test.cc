@@ -52,8 +52,8 @@ class BlockingProgress : public NoProgress {
   int ended_ = 0;
 };
 
-// A thread that waited for its turn to write a snapshot writes the state at the end of its wait,
-// not at the beginning. Otherwise the store could keep an old row at the end of a stage.
+// A thread that had to wait for its turn writes the state at the end of its wait, not at the
+// beginning. Otherwise the job store could keep an old state at the end of a stage.
 TEST(JobProgressTest, WritesTheNewestSnapshot) {
   const TemporaryFolder folder;
   CancelToken cancel;

@@ -59,8 +59,8 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(store.stage_times()[0].largest_thread_share, 0.25);
 }
 
-// A subvolume that is built only in memory is planned again when it is forgotten. A recorded
-// subvolume remains built.
+// A subvolume that is built but not recorded is planned again after forget_built_in_memory(). A
+// recorded subvolume remains built.
 TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));
@@ -73,8 +73,8 @@ TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
   EXPECT_EQ(store.leaves()[1].state, SubvolumeState::kPlanned);
 }
 
-// A split subvolume is replaced by its parts, and a lost subvolume is planned again. Both changes
-// are durable.
+// A split replaces a subvolume with its parts, and a lost subvolume is planned again. Both changes
+// are recorded.
 TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));
@@ -94,8 +94,8 @@ TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// Other processes see a subvolume that is built only in memory as planned. For all processes, a
-// subvolume that is marked for rebuild is planned again.
+// Other processes see a subvolume that is built but not recorded as planned. A subvolume that is
+// marked for rebuild is planned for all processes.
 TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));
@@ -134,7 +134,8 @@ TEST_F(JobStoreTest, StartingOverForgets) {
   EXPECT_EQ(store.leaves().size(), 2u);
 }
 
-// A file of another kind or version is refused, and the error names the kind or version.
+// A file that is not a job store, or has another version, is refused. The error names the kind or
+// the version.
 TEST_F(JobStoreTest, RefusesWhatIsNotItsOwn) {
   std::ofstream(path()) << "this is no database at all, whatever its name may say";
   try {
@@ -213,7 +214,7 @@ TEST_F(JobStoreTest, RemembersTheMerge) {
   EXPECT_FALSE(store.merge().has_value());
 }
 
-// SQLite returns a row that was damaged on the disk. The checksum in the row detects the damage.
+// SQLite does not detect a damaged row, so each row has a checksum, which detects the damage.
 TEST_F(JobStoreTest, NoticesARowThatChanged) {
   for (const char* change : {"x = x + 1", "state = 1", "voxels = 12", "checksum = checksum + 1"}) {
     SCOPED_TRACE(change);
@@ -255,8 +256,8 @@ TEST_F(JobStoreTest, NoticesAChangeInAnyRowThatDecides) {
   }
 }
 
-// Missing rows are detected, whether the first, a middle, the last or all of them are missing.
-// Otherwise the file would lack their voxels.
+// The store detects missing rows of subvolumes: the first, some in the middle, the last, or all.
+// The file would otherwise lack the voxels of these subvolumes.
 TEST_F(JobStoreTest, NoticesMissingRows) {
   for (const char* missing : {"id = 1", "id % 2 = 0", "id = 6", "id = 7", "id > 0"}) {
     SCOPED_TRACE(missing);
@@ -288,8 +289,8 @@ TEST_F(JobStoreTest, CanBeReadDuringABuild) {
   EXPECT_THROW(looker.set_progress(progress), Error);
 }
 
-// The progress of ingest remains when a job starts. It is dropped on request, and when an artifact
-// is lost whose triangles were released. A damaged row is detected.
+// The stored progress of ingest remains when a job starts. It is removed on request, and when an
+// artifact is lost whose triangles were released. A damaged row is detected.
 TEST_F(JobStoreTest, RemembersTheProgressOfIngest) {
   const std::vector<std::byte> record = {std::byte{3}, std::byte{0}, std::byte{200}};
   JobStore store(path(), JobStore::Access::kBuild);

@@ -82,7 +82,8 @@ TEST(SurfaceRecord, RefusesWhatIsNoRecord) {
   EXPECT_THROW(SurfaceRecords(bytes).next(), DamagedTriangles);
 }
 
-// After a store has moved to its file, its records are read from the file, and its memory is free.
+// After a RecordStore has moved from memory to its file, it reads its records from the file, and
+// its memory is free.
 TEST(RecordStore, MovesToItsFile) {
   const TemporaryFolder folder;
   MemoryBudget budget(1 << 20);

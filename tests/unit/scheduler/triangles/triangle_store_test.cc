@@ -1,4 +1,5 @@
-// Tests the guarantees of both triangle stores, and additional guarantees of the durable store.
+// Tests the guarantees that MemoryStore and DurableStore share, and additional guarantees of
+// DurableStore.
 #include "scheduler/triangles/triangle_store.h"
 
 #include <gtest/gtest.h>
@@ -59,8 +60,8 @@ bool equal(const std::vector<FixedTriangle>& a, const std::vector<FixedTriangle>
                     });
 }
 
-// A bin returns its triangles in order: from memory or spilled, with narrow and with wide records,
-// in batches of any size, and again after a rewind.
+// A bin returns its triangles in the order in which they were added: from memory or from disk, with
+// narrow and wide records, in batches of any size, and again after a rewind.
 TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
   for (const bool wide : {false, true})
     for (const uint64_t share_bytes : {uint64_t{0}, uint64_t{20000}, uint64_t{1} << 30}) {
@@ -160,8 +161,8 @@ std::string name_of(const testing::TestParamInfo<Kind>& info) {
 INSTANTIATE_TEST_SUITE_P(Stores, TriangleStoreTest, testing::Values(Kind::kMemory, Kind::kDurable),
                          name_of);
 
-// Another process finds the bins with only the state of a checkpoint. It ignores triangles that
-// were written after the checkpoint.
+// A store that is opened with the state of a checkpoint has the bins of this checkpoint. It ignores
+// triangles that were written later.
 TEST(DurableStoreTest, OpensAtItsLastCheckpoint) {
   TemporaryFolder folder;
   MemoryBudget share(1 << 20);
@@ -194,7 +195,7 @@ TEST(DurableStoreTest, OpensAtItsLastCheckpoint) {
       state = store->checkpoint();
     }
     store->file()->sync();
-    // No checkpoint names these triangles, so the next run does not see them.
+    // These triangles are written after the last checkpoint, so the next run does not see them.
     for (int i = 0; i < 500; ++i) writer.append(0, random_triangle(random, 1000));
     writer.flush();
     EXPECT_FALSE(std::filesystem::exists(folder.file("spill")));

@@ -84,7 +84,8 @@ TEST_F(Attributes, AreThoseOfTheScene) {
         ++cells;
         sheet += *material == 0;
         plain += *material == 1;
-        // Front faces point down: exactly in material 1, and at many angles in the bumpy sheet.
+        // The front faces of both materials point down: the normals of material 1 exactly, and the
+        // normals of the bumpy sheet at many angles.
         EXPECT_LT(normal->y, *material == 1 ? -0.999 : -0.1);
       }
   EXPECT_EQ(cells, report.colors->cells);
@@ -96,8 +97,8 @@ TEST_F(Attributes, AreThoseOfTheScene) {
   EXPECT_GT(sample.cells, 1000u);
 }
 
-// The bytes of a section do not depend on the other attributes of the build. The levels depend on
-// no attribute.
+// The section of an attribute in the file has the same bytes whichever other attributes are built,
+// and the levels are the same for all attributes.
 TEST_F(Attributes, AreIndependent) {
   build(spec(64, 64, kAll));
   std::string sections[5];
@@ -120,7 +121,8 @@ TEST_F(Attributes, AreIndependent) {
   }
 }
 
-// If one of these digests changes, the format or the rule needs a new version.
+// Fixes the bytes of a file with all attributes. If this digest changes, the file format or the
+// rule of an attribute needs a new version.
 TEST_F(Attributes, HaveTheBytesThatTheyAlwaysHad) {
   EXPECT_EQ(build(spec(128, 32, kAll)).sha256,
             "16972932e21dc5dd85a4b0a56dac3cb61857cf9b9b21624c4952ade7de2a560a");
@@ -150,7 +152,8 @@ TEST_F(Attributes, AreTheSameBytesFromEveryRoute) {
   stop("material", 1);
 }
 
-// A cube is baked again unless all its attributes are stored.
+// If the stored artifact of one attribute of a cube is truncated, the cube is baked again; all
+// other cubes are reused.
 TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
   const std::string expected = build(spec(256, 256, kAll)).sha256;
   std::filesystem::remove(output());
@@ -162,8 +165,8 @@ TEST_F(Attributes, AHalfStoredCubeIsBakedAgain) {
   EXPECT_EQ(report.colors->cubes_reused + 1, report.colors->cubes);
 }
 
-// The file contains the names of materials. So a finished file is not reused if a name has
-// changed.
+// A finished file is not reused if the name of a material has changed, because the file contains
+// the names.
 TEST_F(Attributes, FollowTheNamesOfMaterials) {
   BuildSpec s = spec(32, 32, {Attribute::kMaterial});
   s.run.keep_work = true;

@@ -1,4 +1,4 @@
-// Color cubes that a later run reuses or bakes again.
+// Tests which stored color cubes a later run of a build reuses, and which it bakes again.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace voxdag {
 namespace {
 
-// A painted scene whose color grid has 64 cubes. About a third of them have surfaces.
+// A painted scene whose color grid consists of 64 cubes, about a third of which have surfaces.
 class ColorArtifacts : public testing::Test {
  protected:
   void SetUp() override {
@@ -41,7 +41,7 @@ class ColorArtifacts : public testing::Test {
     std::filesystem::remove(output());
     return report;
   }
-  // Adds one to a byte of the artifacts.
+  // Adds one to the byte at this offset of the file with the stored cubes.
   void damage(uint64_t offset) {
     std::fstream file(artifacts(), std::ios::in | std::ios::out | std::ios::binary);
     file.seekg(static_cast<std::streamoff>(offset));
@@ -75,7 +75,8 @@ TEST_F(ColorArtifacts, WithoutAnythingToBakeNoImageIsDecoded) {
   EXPECT_EQ(report.colors->image_bytes, 0u);
 }
 
-// Only the image file changes, not the glTF file. The cubes that show the image are baked again.
+// If the image file changes, but not the glTF file, only the cubes that show the image are baked
+// again.
 TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   PaintedScene::write(folder_.path(), 128);
   const std::string changed = build(spec()).sha256;
@@ -91,7 +92,8 @@ TEST_F(ColorArtifacts, AChangedImageRepeatsTheCubesThatShowIt) {
   EXPECT_LE(colors.cubes_reused + 16, colors.cubes);
 }
 
-// A finished build is also not reused after its image has changed.
+// A finished file is reused as long as its image is unchanged. After a change of the image, it is
+// built again.
 TEST_F(ColorArtifacts, AFinishedBuildIsOfItsImage) {
   BuildSpec s = spec();
   s.run.keep_work = true;
@@ -119,13 +121,15 @@ TEST_F(ColorArtifacts, WhatIsDamagedIsBakedAgain) {
   EXPECT_EQ(colors.cubes_reused + 1, colors.cubes);
   EXPECT_NE(warnings_.text.find("damaged colors are baked again; number of cubes: 1"),
             std::string::npos);
-  // A cut-off end, as after a killed process, gives no warning.
+  // A truncated file, as a killed process leaves it, gives no warning: only the last cube is baked
+  // again.
   warnings_.text.clear();
   bake();
   std::filesystem::resize_file(artifacts(), std::filesystem::file_size(artifacts()) - 1);
   colors = *resume().colors;
   EXPECT_EQ(colors.cubes_reused + 1, colors.cubes);
-  // After a damaged header, the rest of the file cannot be read.
+  // Damages the header of the first cube. All later cubes are lost with it, because their positions
+  // are unknown.
   bake();
   damage(20);
   EXPECT_EQ(resume().colors->cubes_reused, 0u);
@@ -176,7 +180,7 @@ TEST(ColorKeys, NameAllThatColorsDependOn) {
   named.name = "name";
   named.number = 9;
   EXPECT_EQ(look(named), look(plain));
-  // The name and number of a material count only if cells store materials.
+  // The name and the number of a material affect its digest only if the file stores materials.
   const AttributeSet with_materials{Attribute::kMaterial};
   EXPECT_NE(look_digests(std::span(&named, 1), images, with_materials)[0],
             look_digests(std::span(&plain, 1), images, with_materials)[0]);
@@ -225,7 +229,7 @@ TEST(RegionRecords, ComeBackAsTheyWere) {
   EXPECT_THROW(cut.next(), Error);
 }
 
-// Builds on a cluster, whose merge also bakes the colors.
+// Builds with colors on a cluster. The merge bakes the colors.
 class ColorsOnCluster : public Cluster {
  protected:
   void SetUp() override {

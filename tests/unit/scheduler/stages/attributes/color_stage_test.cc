@@ -46,7 +46,8 @@ struct Counts {
   uint64_t red = 0, blue = 0, green = 0, other = 0;
 };
 
-// Counts the set cells of a level by color.
+// Returns the numbers of red, blue and green cells of a level. Red or blue cells on the wrong side
+// of the sheet count as other colors.
 Counts count_colors(const voxdag_reader::File& file, uint32_t level) {
   Counts counts;
   voxdag_reader::ColorCursor cursor(file);
@@ -56,7 +57,7 @@ Counts count_colors(const voxdag_reader::File& file, uint32_t level) {
       for (int64_t z = 0; z < edge; ++z) {
         const auto color = cursor.color(x, y, z, level);
         if (!color) continue;
-        // The sheet is in the lower half of the grid, and the triangle is above it.
+        // The image of the sheet is red at low x and blue at high x.
         if (*color == voxdag_reader::Rgb{255, 0, 0} && x <= edge / 2)
           ++counts.red;
         else if (*color == voxdag_reader::Rgb{0, 0, 255} && x >= edge / 2 - 1)
@@ -83,8 +84,8 @@ TEST_F(ColorStage, AreThoseOfTheMaterials) {
   EXPECT_GT(counts.red, 4000u);
   EXPECT_GT(counts.blue, 4000u);
   EXPECT_GT(counts.green, 500u);
-  // Other colors occur only where a color block has both halves of the image, or both the sheet and
-  // the triangle.
+  // A color block mixes colors if it has cells of both halves of the image, or of the sheet and the
+  // triangle.
   EXPECT_LT(counts.other, file->voxels() / 10);
   NoProgress progress;
   MemoryBudget budget(uint64_t{64} << 20);

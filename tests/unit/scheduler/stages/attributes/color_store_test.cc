@@ -75,7 +75,7 @@ TEST_F(ColorStoreTest, HasWhatWasAdded) {
     EXPECT_EQ(read(store, c_), bytes_of(std::string(300000, 'c')));
     EXPECT_EQ(store.file_bytes(), whole);
   }
-  // An artifact that was not written to its end is overwritten.
+  // A truncated artifact does not count, and a new artifact is written over it.
   std::filesystem::resize_file(path_, whole - 1);
   {
     ColorStore store = open();
@@ -105,7 +105,8 @@ TEST_F(ColorStoreTest, HasArtifactsInParts) {
     ColorStore store = open();
     EXPECT_FALSE(store.has(a_));
     EXPECT_EQ(read(store, b_), bytes_of("two parts"));
-    // Parts of an artifact that an earlier run has not completed do not count.
+    // An earlier run has stored two parts of a_, but not its last part. They are ignored, and a_
+    // begins again with part 0.
     for (uint64_t i = 0; i < 3; ++i) store.add(a_, i, i == 2, bytes_of("abc"));
   }
   EXPECT_EQ(read(open(), a_), bytes_of("abcabcabc"));
@@ -126,7 +127,7 @@ TEST_F(ColorStoreTest, DropsWhatIsMostOfItAndNotWanted) {
   }
   const uint64_t whole = file_bytes();
   {
-    // The store has too little garbage to remove it.
+    // Only about half of the file is garbage, so keep_only() does not rewrite the file.
     ColorStore store = open();
     store.keep_only(std::array{a_}, cancel_);
     EXPECT_EQ(store.file_bytes(), whole);

@@ -1,4 +1,4 @@
-// The colors of a color grid's cubes do not depend on the memory for baking.
+// Tests that the records of a color grid's cubes do not depend on the memory for baking.
 #include "scheduler/stages/attributes/cube_baker.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ namespace {
 
 struct Baked {
   CubeBaker::Records records;
-  size_t parts = 0;  // number of calls that took records before the end
+  size_t parts = 0;  // how often full records were taken before the end
 };
 
 class CubeBaking : public testing::Test {
@@ -68,7 +68,8 @@ class CubeBaking : public testing::Test {
       EXPECT_EQ(&records, &last);
       const size_t most = append();
       EXPECT_GE(most, CubeBaker::kManyRecordBytes);
-      // Records are taken at kManyRecordBytes. One more region has at most 600 KiB of normals.
+      // The baker hands over its records when one attribute has kManyRecordBytes. The last region
+      // adds at most 600 KiB of normals to them.
       EXPECT_LE(most, CubeBaker::kManyRecordBytes + (610 << 10));
       ++baked.parts;
     });
@@ -85,7 +86,8 @@ class CubeBaking : public testing::Test {
   std::vector<FixedSurface> surfaces_;
 };
 
-// Surfaces that do not fit in memory are divided among smaller cubes, down to regions.
+// If the surfaces of a cube do not fit in memory, they are divided among smaller cubes, down to
+// single regions. The records are the same.
 TEST_F(CubeBaking, DividesSurfaces) {
   for (int i = 0; i < 3000; ++i) {
     FixedSurface surface;
@@ -101,7 +103,8 @@ TEST_F(CubeBaking, DividesSurfaces) {
   for (RegionRecords records(whole.records[0]); records.next();) ++regions;
   EXPECT_GT(regions, 100u);
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 60 << 10).records, whole.records);
-  // 1 KiB does not even hold the surfaces of one region, so they are processed in parts.
+  // With 1 KiB, even the surfaces of one region do not fit, so each region processes them in
+  // several parts.
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 1 << 10).records, whole.records);
 }
 
@@ -110,8 +113,8 @@ class SolidCubes : public CubeBaking {
   SolidCubes() : CubeBaking(7) {}
 };
 
-// All cells of the regions are set. So with the smaller memory, a region fits only if its eight
-// children are baked one by one.
+// All cells of the grid have surfaces, so that a region needs the largest memory. With less memory,
+// its eight children are baked one by one, which gives the same records.
 TEST_F(SolidCubes, AreBakedByChildren) {
   constexpr int64_t kEnd = int64_t{1} << (7 + kUnitBits);
   for (int64_t z = kUnitsPerVoxel / 2 | 1; z < kEnd; z += kUnitsPerVoxel)
@@ -126,7 +129,7 @@ TEST_F(SolidCubes, AreBakedByChildren) {
   for (RegionRecords records(whole.records[0]); const auto region = records.next();)
     cells += region->counts[0];
   EXPECT_EQ(cells, uint64_t{1} << 21);
-  // The records are taken several times, so only a few regions are in memory.
+  // Records were handed over several times, so that only a few regions are in memory at any time.
   EXPECT_GE(whole.parts, 4u);
   for (const uint64_t surface_bytes : {1 << 20, 2 << 10}) {
     const Baked by_children = bake(ColorMemory::kRegionBytes, surface_bytes);

@@ -37,7 +37,7 @@ query::Picture render(const std::string& path) {
                         cancel);
 }
 
-// A render of a file with damaged colors fails, and the error names the damage.
+// Rendering a file with damaged colors fails, and the error names the damaged region.
 TEST(DamagedColors, EndARender) {
   const TemporaryFolder folder;
   BuildSpec spec;

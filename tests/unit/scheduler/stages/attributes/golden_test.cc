@@ -37,7 +37,8 @@ TEST(GoldenColors, Png) {
   EXPECT_EQ(digest_of("", 16), "c5edeb1ed8c25e73db763d62cb6908aa5559b2169b549c9ed96fc52b5a032f6f");
 }
 
-// Both JPEG files have the same samples, one as a baseline and one as a progressive image.
+// The two JPEG files encode the same samples, one as a baseline image and one as a progressive
+// image. So they give the same file.
 TEST(GoldenColors, Jpeg) {
   const char* const expected = "37b0b86705169ef42183e369c19154ed5af1e19cf4a098456979f4e274d81030";
   EXPECT_EQ(digest_of("waves.jpg", 128), expected);

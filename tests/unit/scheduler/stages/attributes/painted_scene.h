@@ -1,5 +1,5 @@
-// A glTF scene that uses every source of color: a bumpy sheet with an image whose halves are red
-// and blue, and a triangle with green vertices above it.
+// A glTF scene with colors from an image and from vertices. It has a bumpy sheet with an image
+// whose halves are red and blue, and above it a triangle with green vertices.
 #pragma once
 
 #include <cmath>

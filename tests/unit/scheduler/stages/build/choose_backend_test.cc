@@ -19,8 +19,8 @@ class BackendWarnings : public NoProgress {
   std::vector<std::string> all;
 };
 
-// The CPU backend with a defect: it omits the lowest voxel of the last brick that has more than one
-// voxel.
+// A defective backend: like the CPU backend, but omits the lowest voxel of the last brick with more
+// than one voxel.
 class Forgetful : public Backend {
  public:
   std::string_view name() const override { return "forgetful"; }
@@ -44,7 +44,8 @@ class Forgetful : public Backend {
 
 std::unique_ptr<Backend> right_gpu(int) { return make_parallel_host_backend(Method::kFast); }
 
-// The check accepts every correct backend, and detects a backend that omits a single voxel.
+// difference_from_cpu() accepts every correct backend, and detects a backend that omits a single
+// voxel.
 TEST(BackendCheck, FindsOneVoxel) {
   for (const Method method : {Method::kFast, Method::kPointers, Method::kHashes})
     EXPECT_EQ(difference_from_cpu(*make_parallel_host_backend(method)), "");
@@ -52,8 +53,8 @@ TEST(BackendCheck, FindsOneVoxel) {
   EXPECT_NE(difference_from_cpu(forgetful), "");
 }
 
-// Without a GPU, the CPU is chosen without a warning. GPUs that pass the check are chosen, and
-// workers use them in turn.
+// Without a GPU, the CPU is chosen and no warning is printed. If GPUs pass the check, they are
+// chosen, and the workers are distributed among them.
 TEST(ChooseBackend, AutoChoosesGpusThatAreRight) {
   BackendWarnings warnings;
   EXPECT_EQ(choose_automatically({}, kPlenty, warnings).name, "cpu");
@@ -94,7 +95,8 @@ TEST(ChooseBackend, AutoFallsBackToTheCpu) {
   expect_cpu({1, broken}, kPlenty, "cudaStreamCreate failed");
 }
 
-// Unknown names are refused, and also methods that the chosen backend does not have.
+// Refuses unknown names of backends and methods, and a method that the chosen backend does not
+// have.
 TEST(ChooseBackend, RefusesWhatDoesNotGoTogether) {
   const auto refused = [](const std::string& backend, const std::string& method) {
     RunOptions options;

@@ -1,4 +1,5 @@
-// Ingest gives the same result on any number of threads, and reports the first error.
+// Tests that ingest gives the same result on any number of threads, and reports the first error of
+// the scene.
 #include "scheduler/stages/ingest/ingest.h"
 
 #include <gtest/gtest.h>
@@ -16,9 +17,9 @@
 namespace voxdag {
 namespace {
 
-// Small triangles along a diagonal. Every tenth is far outside the grid. One in a hundred is left
-// out, as if it were invalid and dropped. read() fails at triangle `fails_at`; triangle
-// `too_far_at` has a coordinate of -1e15, too far away to be ingested.
+// A scene of small triangles along a diagonal. Every tenth triangle is far outside the grid. One of
+// a hundred is omitted, as a reader omits invalid triangles. Reading triangle `fails_at` fails.
+// Triangle `too_far_at` has the coordinate -1e15, which ingest refuses.
 class Diagonal : public TriangleSource {
  public:
   static constexpr uint64_t kTriangles = 200'000;
@@ -74,7 +75,8 @@ class IngestTest : public testing::TestWithParam<unsigned> {
     const BuildContext build{system_files(), progress_, cancel_};
     ingest(scene_, state_, triangles_, top_, {build, threads, budget_}, after_piece);
   }
-  // Checks the triangles, their order and the results of the complete scene.
+  // Checks that the stored triangles, their order, the top tree and the digest are right for the
+  // complete scene.
   void expect_whole_scene() {
     ASSERT_EQ(triangles_.count(kSceneBin), state_.counts.triangles);
     std::vector<FixedTriangle> triangles(state_.counts.triangles);
@@ -112,7 +114,7 @@ TEST_P(IngestTest, ReadsTheSceneInOrder) {
   expect_whole_scene();
 }
 
-// Ingest that resumes at any piece ends in the same state as uninterrupted ingest.
+// Ingest that resumes after any piece of the scene ends in the same state as uninterrupted ingest.
 TEST_P(IngestTest, Continues) {
   std::vector<IngestState> states;
   std::vector<std::vector<std::byte>> cells;
@@ -131,7 +133,8 @@ TEST_P(IngestTest, Continues) {
   }
 }
 
-// Triangles that were read before an error of the scene are ingested and are part of the state.
+// If the scene cannot be read from some triangle on, ingest fails. The state then includes all
+// complete pieces before this triangle.
 TEST_P(IngestTest, ASceneThatFailsIsAnError) {
   scene_.fails_at = 5 * kPiece + 7;
   EXPECT_EQ(error_of_ingest([] {}).code(), ErrorCode::kIo);
@@ -142,8 +145,8 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
   scene_.too_far_at = 5 * kPiece + 7;
   const Error error = error_of_ingest([] {});
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
-  // Triangle 81927 is too far away. Its number in the error is lower by 820, because the error does
-  // not count the invalid triangles before it.
+  // The error counts only valid triangles. 820 invalid triangles are omitted before triangle 81927,
+  // the one that is too far away, so the error names triangle 81107.
   EXPECT_NE(error.message().find("triangle 81107 of the scene"), std::string::npos)
       << error.message();
 }
@@ -160,7 +163,8 @@ TEST_P(IngestTest, AnErrorAtACheckpointStopsReading) {
   EXPECT_LE(scene_.read, (2 + GetParam()) * kPiece);
 }
 
-// If memory is insufficient for several readers of a scene, a single reader reads it.
+// If the memory suffices only for one reader of the scene instead of one per thread, ingest
+// continues with one reader.
 TEST_P(IngestTest, OneReaderIsEnough) {
   scene_.max_cursors = 1;
   ingest_on(GetParam(), [] {});

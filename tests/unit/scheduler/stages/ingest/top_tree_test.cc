@@ -25,7 +25,8 @@ FixedTriangle triangle_near(std::mt19937_64& random, int64_t size_units) {
   return t;
 }
 
-// Returns the leaves that the triangle touches. Tests each leaf with the exact overlap test.
+// Returns the indexes of the leaves that the triangle touches, by an exact overlap test with each
+// leaf.
 std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
                                            const std::vector<SubvolumePlan>& leaves) {
   std::vector<size_t> touched;
@@ -51,7 +52,8 @@ void add(TopTree& top, const FixedTriangle& t) {
   top.add(tally);
 }
 
-// Counting many triangles in one tally gives the sum of separate counts.
+// Triangles that are counted together in one tally give the same top tree as triangles in separate
+// tallies.
 TEST(TopTree, OneTallyOrMany) {
   MemoryBudget budget(uint64_t{1} << 30);
   TopTree one(kLevels, budget, 5), many(kLevels, budget, 5);
@@ -81,8 +83,8 @@ TEST(TopTree, OneTallyOrMany) {
   }
 }
 
-// For any division into subvolumes, each triangle is assigned to all subvolumes that it touches.
-// The plan has a subvolume wherever a triangle touches the grid.
+// For any division into subvolumes, CubeTree assigns a triangle to all subvolumes that it touches.
+// Each triangle that touches the grid touches a subvolume of the plan.
 TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   MemoryBudget budget(uint64_t{1} << 30);
   for (const int64_t size : {int64_t{600}, int64_t{40000}, int64_t{900000}}) {
@@ -103,11 +105,11 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
         std::vector<size_t> got;
         tree.for_each_touched(t, hint, [&](size_t leaf) { got.push_back(leaf); });
         std::sort(got.begin(), got.end());
-        // The tree may assign a triangle to a leaf that it does not touch: if the triangle's box is
-        // inside one cube, the overlap is not tested. It must not omit a leaf.
+        // The tree must find all touched leaves. It may also find a leaf that the triangle does not
+        // touch, because it does not test the overlap if one cube contains the triangle's bounding
+        // box.
         const auto touched = touched_by_brute_force(t, leaves);
         EXPECT_TRUE(std::includes(got.begin(), got.end(), touched.begin(), touched.end()));
-        // If the triangle touches the grid, it touches at least one leaf.
         const int64_t origin[3] = {0, 0, 0};
         if (triangle_touches_cube(t, origin, int64_t{kUnitsPerVoxel} << kLevels)) {
           EXPECT_FALSE(touched.empty());
@@ -117,7 +119,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
   }
 }
 
-// CubeTree finds the parts of a split cube that each triangle touches, even for triangles that
+// CubeTree finds the octants of a split cube that each triangle touches, even for triangles that
 // extend beyond the cube.
 TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   const Cube whole{2, {1, 2, 1}};
@@ -152,7 +154,7 @@ TEST(CubeTree, FindsThePartsOfACubeThatTrianglesTouch) {
   EXPECT_GT(beyond, 20);
 }
 
-// Whatever the size of a triangle, its weight is counted in exactly the cells that it touches.
+// A triangle of any size is counted in exactly the cells that it touches.
 TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
   constexpr uint32_t kDepth = 4;
   std::mt19937_64 random(11);
@@ -170,16 +172,16 @@ TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
             const int64_t corner[3] = {x * units, y * units, z * units};
             touched += triangle_touches_cube(t, corner, units);
           }
-      // A box inside one cell is not tested, so a triangle that touches no cell may still be
-      // counted.
+      // A triangle that touches no cell may nevertheless be counted, because the overlap is not
+      // tested if one cell contains its bounding box.
       if (touched > 0) {
         EXPECT_EQ(top.occupied_cells(), touched) << "size " << size << ", " << i;
       }
     }
 }
 
-// The cubes of a plan are disjoint and in Morton order. Only a single cell may be heavier than
-// requested.
+// The cubes of a plan by weight are disjoint. A cube is heavier than requested only if it is a
+// single cell of the top tree, which cannot be divided.
 TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(3);
@@ -204,16 +206,16 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
 }
 
-// The expected number of voxels is the volume of a Minkowski sum. For a right triangle along the
-// axes, this volume is known in closed form.
+// The expected number of voxels of a triangle is the volume of its Minkowski sum with a voxel. For
+// a right triangle with two edges along axes, a formula for this volume is known.
 TEST(TopTree, ExpectedVoxelsOfAnAxisAlignedTriangle) {
   FixedTriangle t{{{1, 1, 1}, {1 + 256 * 100, 1, 1}, {1, 1 + 256 * 50, 1}}};
   EXPECT_NEAR(expected_work(t).voxels, 0.5 * 100 * 50 + 100 + 50 + 1, 1e-6);
   EXPECT_NEAR(expected_work(t).bricks, 0.5 * 25 * 12.5 + 25 + 12.5 + 1, 1e-6);
 }
 
-// A tally of many triangles, even if it is reused after clear(), gives the sum of tallies of
-// single triangles.
+// A tally of many triangles gives the same weights as one tally per triangle, also if the tally is
+// used again after clear().
 TEST(TopTree, TalliesAddUp) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(5);
@@ -239,7 +241,8 @@ TEST(TopTree, TalliesAddUp) {
   }
 }
 
-// A top tree that takes over the cells of another top tree gives the same plans.
+// A top tree that begins with the cells of another top tree, as after a resumed ingest, gives the
+// same plans as an uninterrupted one.
 TEST(TopTree, ContinuesFromTheCellsOfAnother) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(4);

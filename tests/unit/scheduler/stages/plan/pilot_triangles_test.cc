@@ -13,7 +13,8 @@ namespace {
 
 constexpr uint32_t kShift = 6;
 
-// Stores small triangles in the order of a grid. Many of them are equal on the pilot's grid.
+// Stores small triangles, row by row. Many of them become equal when they are snapped to the
+// coarser grid of the pilot.
 void fill(MemoryStore& store, int rows) {
   std::mt19937 random(7);
   BinWriter writer(store, {kSceneBin}, 1 << 20);
@@ -60,7 +61,7 @@ class PilotTrianglesTest : public testing::Test {
   MemoryStore store_{system_files(), folder_.file("spill"), false, budget_};
 };
 
-// Keeps every distinct triangle. Few of the kept triangles are duplicates.
+// PilotTriangles keeps every distinct triangle, and removes most duplicates.
 TEST_F(PilotTrianglesTest, EqualOnesNearEachOtherAreThereOnce) {
   const auto all = read_all(*store_.open(kSceneBin), kShift);
   const std::set<Key> distinct(all.begin(), all.end());

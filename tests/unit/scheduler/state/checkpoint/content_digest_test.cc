@@ -7,8 +7,8 @@
 namespace voxdag {
 namespace {
 
-// The digest depends on the grid, the pieces and their order. A copy of a digest can be continued
-// independently.
+// The digest depends on the grid, and on the pieces of the scene and their order. A copy of a
+// digest can be continued independently of the original.
 TEST(ContentDigest, TellsContentsApart) {
   const Checksum128 a{1, 2}, b{3, 4};
   std::set<std::string> all;

@@ -1,4 +1,5 @@
-// Builds that leave out cutouts resume after an interruption. They start over if an image changed.
+// Builds that omit cut-out parts of surfaces resume after an interruption. If an image has changed,
+// they start over.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -50,7 +51,7 @@ class CutoutCheckpointTest : public testing::Test {
     whole_ = files_.bytes_read[scene_];
     return sha256;
   }
-  // Returns the bytes read of the scene, as a fraction of the bytes that a complete build reads.
+  // Returns the fraction of the scene file that the last build read, relative to a complete build.
   double part_read() {
     return static_cast<double>(files_.bytes_read[scene_]) / static_cast<double>(whole_);
   }
@@ -89,8 +90,8 @@ TEST_F(CutoutCheckpointTest, NoticesAChangeOfAnImage) {
   }
 }
 
-// Without the image, nothing is cut out. If the image appears before the build resumes, the result
-// is the same as if the image had been there from the start.
+// A build begins without the image, so it cuts nothing out. If the image appears before the build
+// resumes, the result is the same as if the image had existed from the beginning.
 TEST_F(CutoutCheckpointTest, NoticesANewImage) {
   const std::string image = folder_.file("leaf.png"), other = folder_.file("other.png");
   std::filesystem::rename(image, other);
@@ -110,8 +111,8 @@ TEST_F(CutoutCheckpointTest, OptionsOfCutoutsAreOtherBuilds) {
   EXPECT_EQ(digest(spec()), expected_);
 }
 
-// The estimated disk space includes the patches of cut triangles, even if the scene itself is
-// small, because patches are stored as triangles.
+// The estimated disk space includes the patches into which cut triangles are divided, because they
+// are stored like triangles. This matters if a small scene has many patches.
 TEST_F(CutoutCheckpointTest, DiskSpaceOfPatches) {
   BuildSpec small = spec();
   small.run.durable_min_triangles = 1000;

@@ -69,8 +69,7 @@ class IngestCheckpointTest : public testing::Test {
     std::filesystem::remove(output());
     return report;
   }
-  // Returns the bytes that were read of the scene, as a fraction of the bytes that a complete build
-  // reads.
+  // Returns the fraction of the scene file that the last build read, relative to a complete build.
   double part_read() {
     return static_cast<double>(files_.bytes_read[scene()]) / static_cast<double>(whole_);
   }
@@ -89,7 +88,7 @@ TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
   struct Moment {
     const char* stage;
     uint64_t after;
-    double min_read, max_read;  // part of the scene that is read afterwards
+    double min_read, max_read;  // limits of part_read() for the resumed build
   };
   for (const Moment& moment :
        {Moment{"scan", 40000, 0.6, 0.9}, Moment{"ingest", 10000, 0.3, 0.6},
@@ -102,7 +101,8 @@ TEST_F(IngestCheckpointTest, ResumesWhereItWas) {
   }
 }
 
-// The partition also resumes at each of its checkpoints.
+// A build that fails in the partition, here at a failing sync, resumes at the last checkpoint of
+// the partition and does not read the scene again.
 TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   build(often());
   std::filesystem::remove(output());
@@ -120,8 +120,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   }
 }
 
-// Run options may change between the runs. The triangles of a subvolume that is split later are
-// found, whether or not the subvolume was built before.
+// A build may be resumed with other run options. Subvolumes may then be split that were already
+// planned or built; their triangles are found without reading the scene again.
 TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
@@ -138,7 +138,8 @@ TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   }
 }
 
-// The triangles of recorded subvolumes are removed from the disk.
+// The triangles of built and recorded subvolumes are removed from the disk, and their file is
+// removed before the merge.
 TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
   build_until(spec(), "build", 0);
   const uint64_t all = std::filesystem::file_size(durable());
@@ -150,8 +151,8 @@ TEST_F(IngestCheckpointTest, FreesWhatIsBuilt) {
   expect_to_resume(spec());
 }
 
-// A build with another scene of the same name is refused, and the job is not changed. The job
-// resumes when the first scene is back, even if its files have new times.
+// If the scene file is replaced by another scene, the build is refused, and the job is not changed.
+// When the first scene is back, the job resumes, even if its file has new times.
 TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
   build_until(spec(), "build", 20);
   std::filesystem::rename(scene(), folder_.file("first.glb"));
@@ -169,8 +170,8 @@ TEST_F(IngestCheckpointTest, KnowsItsSceneByContent) {
   EXPECT_GE(part_read(), 1);
 }
 
-// A changed byte is detected even if the modification time is set back, or if the byte changes
-// during ingest.
+// If a byte of the scene has changed after an interruption in scan or ingest, the resumed build
+// reads the scene again, even if the modification time was set back.
 TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
   for (const char* stage : {"scan", "ingest"}) {
     SCOPED_TRACE(stage);
@@ -193,7 +194,8 @@ TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
   }
 }
 
-// A change of a buffer in a separate file is noticed.
+// If a buffer in a separate file was touched after an interruption, the resumed build reads it
+// again.
 TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   const std::string glb = read_small_file(system_files(), scene(), UINT64_MAX);
   uint32_t json_size = 0;
@@ -213,9 +215,10 @@ TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   EXPECT_GT(files_.bytes_read[buffer], std::filesystem::file_size(buffer));
 }
 
-// If stored triangles are damaged, a warning names the damage, and the scene is read again.
+// If the stored triangles or the record of ingest are damaged, a warning names them, and the build
+// reads the scene again.
 TEST_F(IngestCheckpointTest, DamageIsHealed) {
-  // Flips one bit in every `distance` bytes, except for the last few bytes.
+  // Flips one bit in every `distance` bytes, from the fifth-last byte of the file backward.
   const auto flip = [&](uint64_t distance) {
     std::fstream file(durable(), std::ios::in | std::ios::out | std::ios::binary);
     for (int64_t at = static_cast<int64_t>(std::filesystem::file_size(durable())) - 5; at > 0;
@@ -247,7 +250,8 @@ TEST_F(IngestCheckpointTest, DamageIsHealed) {
     }
 }
 
-// If an artifact is found damaged after its triangles were removed, the scene is read again.
+// If an artifact is damaged and its triangles were already removed, the build reads the scene
+// again.
 TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   build_until(spec(), "merge", 0);
   std::filesystem::resize_file(work() + "/segment-0.vdseg", 1000);
@@ -255,8 +259,9 @@ TEST_F(IngestCheckpointTest, ReadsTheSceneForADamagedArtifact) {
   EXPECT_GE(part_read(), 1);
 }
 
-// If the disk has no space for the triangles but memory has, there are no checkpoints. If the disk
-// becomes full later, the scene is read again, into memory.
+// If the triangles do not fit on the disk but fit in memory, the build works without checkpoints.
+// If the disk becomes full during ingest, the build reads the scene again and keeps its triangles
+// in memory.
 TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   files_.free_bytes = 3'000'000;
   EXPECT_EQ(build(spec()).sha256, expected_);
@@ -269,7 +274,8 @@ TEST_F(IngestCheckpointTest, DoesWithoutDiskSpace) {
   EXPECT_NE(last_warning_.text.find("memory"), std::string::npos) << last_warning_.text;
 }
 
-// A restart drops the ingested triangles. A small scene has no checkpoints.
+// With `restart`, a build drops the ingested triangles and reads the scene again. A build of a
+// small scene writes no checkpoints.
 TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   build_until(spec(), "build", 0);
   BuildSpec again = spec();
@@ -282,7 +288,9 @@ TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   EXPECT_FALSE(files_.bytes_written.contains(durable()));
 }
 
-// A file's times are trusted only after the clock for file times has advanced beyond them.
+// trusted_from_ns() returns the time from which the times of the files identify their contents. It
+// is later than the times by a tick of the file system's clock, because a write within the same
+// tick would not change them.
 TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {
