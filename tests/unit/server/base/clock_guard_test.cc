@@ -7,8 +7,8 @@ namespace {
 
 constexpr double kDayS = 86400, kYearS = 365 * kDayS;
 
-// A clock that is far ahead is uncertain for a day, whether it jumped while the service ran or
-// before.
+// After a clock has jumped far ahead, it is not trusted for a day, whether it jumped while the
+// service ran or before.
 TEST(ClockGuard, DoubtsAClockThatJumps) {
   ClockGuard running(1e9);
   EXPECT_FALSE(running.has_jumped(1e9 + 100, 50));

@@ -19,8 +19,8 @@ class SmallDisk : public ForwardingFiles {
   uint64_t free = 100 * kMiB;
 };
 
-// Writes up to `bytes` bytes, until the disk is full, and returns the number of written bytes.
-// Written bytes are no longer free.
+// Simulates an upload of `bytes` bytes with this reservation, until the disk is full. Written bytes
+// are no longer free. Returns the number of written bytes.
 uint64_t fill(SmallDisk& disk, DiskSpace::Reservation& space, uint64_t bytes) {
   constexpr uint64_t kPiece = kMiB / 4;
   uint64_t written = 0;
@@ -45,8 +45,8 @@ bool fits(DiskSpace& space, uint64_t announced) {
   }
 }
 
-// An upload that cannot fit is refused when it begins. An upload of unknown size is refused if only
-// the space that uploads must leave free is left.
+// Uploads must leave 30 MiB of the disk free. An upload that declares more than the rest is refused
+// when it begins. An upload of unknown size is stopped before it uses the 30 MiB.
 TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -68,8 +68,8 @@ TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   EXPECT_FALSE(space.is_low());
 }
 
-// Clients that announce uploads as large as the disk but send few bytes do not exclude others. Only
-// the space for their next bytes is reserved.
+// A client that declares an upload as large as the disk but sends few bytes does not exclude
+// others, because only the space for its next bytes is reserved.
 TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -84,7 +84,7 @@ TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   EXPECT_EQ(disk.free, 30 * kMiB);
 }
 
-// At the end of an upload, all its reserved space is released.
+// When an upload ends, even unfinished, all space that it has reserved is released.
 TEST(DiskReservations, UploadsGiveBackWhatTheyReserved) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -97,7 +97,7 @@ TEST(DiskReservations, UploadsGiveBackWhatTheyReserved) {
   EXPECT_TRUE(fits(space, 70 * kMiB));
 }
 
-// If other programs fill the disk, an upload stops.
+// If other programs fill the disk during an upload, the upload stops.
 TEST(DiskReservations, AnUploadStopsIfTheDiskFillsUp) {
   const TemporaryFolder folder;
   SmallDisk disk;
@@ -124,8 +124,8 @@ TEST(DiskReservations, ABallastGivesRoomForDeletions) {
   EXPECT_FALSE(disk.exists(folder.file("ballast"))) << "the databases need room to open";
 }
 
-// If the ballast file cannot be written completely, it is removed, because an incomplete ballast
-// would be too small.
+// The ballast is a file whose removal frees space on a full disk. If it cannot be written
+// completely, it is removed, because an incomplete file would free too little.
 TEST(DiskReservations, ABallastIsWholeOrAbsent) {
   class FailingDisk : public SmallDisk {
    public:

@@ -70,7 +70,8 @@ TEST(Target, IsParsed) {
   EXPECT_EQ(parse_target("http://host:80/x").segments, (std::vector<std::string>{"x"}));
 }
 
-// Dots and encoded slashes are parts of segment names; they neither join nor split segments.
+// The parser of targets does not resolve dots or encoded slashes: they are parts of the names of
+// segments.
 TEST(Target, DoesNotResolveDots) {
   EXPECT_EQ(parse_target("/a/../b").segments, (std::vector<std::string>{"a", "..", "b"}));
   EXPECT_EQ(parse_target("/a/..%2f..%2fetc").segments,
@@ -93,8 +94,8 @@ TEST(Headers, CompareCaseInsensitively) {
   EXPECT_EQ(trimmed(" "), "");
 }
 
-// If the table is full, a new connection replaces the connection that has waited longest.
-// Connections with a request are kept.
+// If the table is full, a new connection replaces the connection that has waited longest for a
+// request. Connections whose requests are being answered are kept.
 TEST(ConnectionTable, EvictsTheLongestWaiting) {
   HttpLimits limits;
   limits.max_connections = 4;
@@ -118,8 +119,8 @@ TEST(ConnectionTable, EvictsTheLongestWaiting) {
   EXPECT_EQ(table.size(), 2u);
 }
 
-// Connections that wait for their client within a body or an answer are also closed for a new
-// connection, but only if they have waited for some time.
+// If the table is full, a new connection also replaces a connection that has waited for its client
+// in the middle of a body or an answer, but only if it has waited for some time.
 TEST(SlowConnections, SlowTransfersAreEvicted) {
   HttpLimits limits;
   limits.max_connections = 4;
@@ -139,7 +140,7 @@ TEST(SlowConnections, SlowTransfersAreEvicted) {
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
 }
 
-// A connection that waits for the rest of a short body may be closed at any time.
+// A connection that waits for the rest of a short body may be replaced at any time.
 TEST(SlowConnections, ShortBodiesAreEvictedWithoutDelay) {
   HttpLimits limits;
   limits.max_connections = 1;
@@ -152,8 +153,8 @@ TEST(SlowConnections, ShortBodiesAreEvictedWithoutDelay) {
   EXPECT_TRUE(table.admit(-1, "10.0.0.2", second));
 }
 
-// The answers of all connections have a memory limit. An answer that waits for its client gives way
-// to a new one; an answer whose client reads does not.
+// All answers together have a memory limit. If it is reached, a new answer replaces the one that
+// has waited longest for its client. Answers whose clients are reading are kept.
 TEST(AnswerMemory, TheLongestWaitingAnswerGivesWay) {
   constexpr size_t kMost = ConnectionTable::kMaxAnswerBytes;
   const HttpLimits limits;
@@ -192,7 +193,8 @@ TEST(AnswerMemory, OneClientCannotTakeItAll) {
   EXPECT_TRUE(table.reserve_answer(other, kMost));
 }
 
-// A proxy on the loopback forwards the requests of all clients, so it may use all the memory.
+// The limit per client does not apply to loopback addresses, because a proxy on this machine
+// forwards the requests of all clients.
 TEST(AnswerMemory, TheLoopbackMayTakeItAll) {
   constexpr size_t kMost = ConnectionTable::kMaxAnswerBytes;
   const HttpLimits limits;
@@ -211,7 +213,8 @@ TEST(AnswerMemory, TheLoopbackMayTakeItAll) {
   }
 }
 
-// The number of evicted connections whose threads still run is limited.
+// An evicted connection remains until its thread ends. The number of such connections is limited,
+// here to 3.
 TEST(SlowConnections, EvictedConnectionsAreBounded) {
   HttpLimits limits;
   limits.max_connections = 8;
@@ -222,7 +225,7 @@ TEST(SlowConnections, EvictedConnectionsAreBounded) {
   EXPECT_EQ(admitted, 11u);
 }
 
-// The addresses of a /64 network are one client. So are the two spellings of an IPv4 address.
+// All addresses of a /64 network are one client, and so are the two notations of an IPv4 address.
 TEST(SlowConnections, AnIpv6NetworkIsOneClient) {
   EXPECT_EQ(client_of("10.0.0.1"), "10.0.0.1");
   EXPECT_EQ(client_of("::ffff:10.0.0.1"), "10.0.0.1");

@@ -1,4 +1,4 @@
-// Tests how requests are read: the head from a text, and complete exchanges over a socket pair.
+// Tests the parser of request heads, and complete exchanges over a socket pair.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -26,7 +26,7 @@ int status_of(const std::string& head) {
   return 200;
 }
 
-// Returns the status for a head that begins with these lines and is otherwise valid.
+// Returns the status of a request with these header fields that is otherwise valid.
 int status_of_fields(const std::string& fields) {
   return status_of("GET / HTTP/1.1\r\nHost: a\r\n" + fields + "\r\n");
 }
@@ -82,7 +82,7 @@ TEST(RequestHead, RejectsMalformedFields) {
   EXPECT_EQ(status_of_fields(std::string("a: \0b\r\n", 7)), 400);
 }
 
-// Framing that two readers could interpret differently is rejected.
+// Rejects headers from which a proxy and the service could derive different lengths of the body.
 TEST(RequestHead, RejectsAmbiguousFraming) {
   for (const std::string fields :
        {"Content-Length: 1\r\nContent-Length: 1\r\n", "Content-Length: 1, 1\r\n",
@@ -115,8 +115,8 @@ TEST(HostileRequests, FieldsAreBounded) {
   EXPECT_EQ(status_of_fields(fields + "x: y\r\n"), 431);
 }
 
-// A connection to a client that has sent `bytes`. Unless `waits` is true, the client has closed its
-// sending side.
+// Connects the server's Connection with a simulated client that has sent `bytes`. The client has
+// then closed its sending side, unless `waits` is true.
 class Client {
  public:
   explicit Client(const std::string& bytes, bool waits = false) {
@@ -134,7 +134,7 @@ class Client {
   }
 
   Connection& connection() { return *connection_; }
-  // Reads the head of the next request. Returns the status of the request's error; 0 if the
+  // Reads the head of the next request. Returns 200, or the status of the error; 0 if the
   // connection has ended.
   int next_request() {
     body_.clear();
@@ -159,7 +159,7 @@ class Client {
     send(ends_[1], bytes.data(), bytes.size(), MSG_NOSIGNAL);
   }
   bool answer(Response response) { return exchange_->answer(std::move(response), false); }
-  // Returns the bytes that the client can read now.
+  // Returns all bytes that the server has sent to the client since the last call.
   std::string received() {
     std::string text(1 << 16, '\0');
     const ssize_t got = recv(ends_[1], text.data(), text.size(), 0);
@@ -183,7 +183,8 @@ std::string put(const std::string& fields, const std::string& body) {
 }
 std::string chunked(const std::string& body) { return put("Transfer-Encoding: chunked\r\n", body); }
 
-// A connection serves several requests, however their bodies are framed.
+// A connection serves several requests one after the other, with bodies of known length and with
+// chunked bodies.
 TEST(Exchange, ReadsOneRequestAfterTheOther) {
   Client client("\r\n\r\n" + put("Content-Length: 3\r\n", "abc") +
                 chunked("3;x=y\r\nabc\r\n0A \r\n0123456789\r\n0\r\nTrailer: x\r\n\r\n") +
@@ -198,7 +199,8 @@ TEST(Exchange, ReadsOneRequestAfterTheOther) {
   EXPECT_EQ(client.next_request(), 0);
 }
 
-// After a body that was not read to its end, the connection is closed.
+// If a handler does not read a body to its end, the connection is closed, because the rest would be
+// taken for the next request.
 TEST(Exchange, ClosesAfterAnUnreadBody) {
   Client client(put("Content-Length: 3\r\n", "abc"));
   ASSERT_EQ(client.next_request(), 200);
@@ -229,7 +231,8 @@ TEST(Exchange, RejectsMalformedChunks) {
   }
 }
 
-// The lines between and after chunks have a total limit.
+// The lines before chunks and the trailer fields have a total limit of bytes. The chunks themselves
+// may be small and many.
 TEST(HostileRequests, LinesOfChunksAreBounded) {
   const std::string endless(32768, '0');
   std::string extensions, trailers;
@@ -257,7 +260,7 @@ TEST(HostileRequests, LinesOfChunksAreBounded) {
   EXPECT_EQ(client.body().size(), 10000u);
 }
 
-// Empty lines before a request are ignored, but only as many as a header may have bytes.
+// Empty lines before a request are ignored until they exceed the limit of bytes for a header.
 TEST(HostileRequests, EmptyLinesAreBounded) {
   std::string lines;
   for (int i = 0; i < 20000; ++i) lines += "\r\n";
@@ -265,7 +268,8 @@ TEST(HostileRequests, EmptyLinesAreBounded) {
   EXPECT_EQ(client.next_request(), 431);
 }
 
-// The time limit of a short body ends with the body. It does not concern the next request.
+// The time limit of a short body ends with the body. The following answer and the next request are
+// not affected.
 TEST(HostileRequests, TheDeadlineOfABodyEndsWithIt) {
   Client client(put("Content-Length: 1\r\n", "x"), true);
   ASSERT_EQ(client.next_request(), 200);
@@ -278,8 +282,8 @@ TEST(HostileRequests, TheDeadlineOfABodyEndsWithIt) {
   EXPECT_EQ(client.request().read_short_body(ignore), BodyEnd::kComplete);
 }
 
-// A short body has a time limit for the complete request, even if its bytes follow each other
-// faster than the minimum rate.
+// A short body must be complete within a time limit, even if its bytes arrive faster than the
+// minimum rate.
 TEST(HostileRequests, ShortBodiesHaveADeadline) {
   Client client(put("Content-Length: 100000000\r\n", ""), true);
   ASSERT_EQ(client.next_request(), 200);
@@ -315,7 +319,7 @@ TEST(Exchange, TimesOut) {
   EXPECT_EQ(idle.next_request(), 0);
 }
 
-// A client that was fast at first may not be silent for longer than other clients.
+// A client that sent many bytes at first may then not be silent for longer than other clients.
 TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   Client client(put("Content-Length: 1000000\r\n", std::string(100000, 'x')), true);
   ASSERT_EQ(client.next_request(), 200);
@@ -325,8 +329,8 @@ TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   EXPECT_LT(wall_seconds() - start, 20);
 }
 
-// An answer without content has no Content-Length. The answer to HEAD has the length of the content
-// that it omits.
+// An answer whose status allows no content has no Content-Length. The answer to HEAD has the length
+// of the content that it omits.
 TEST(Exchange, WritesAnswers) {
   const auto answer_to = [](const std::string& request, Response response) {
     Client client(request);

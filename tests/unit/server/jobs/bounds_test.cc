@@ -1,4 +1,5 @@
-// A job has a bounded size, and its texts are printable, whatever its client and its process send.
+// Whatever a client and a job's process send, the stored job has a bounded size, and its texts are
+// printable.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

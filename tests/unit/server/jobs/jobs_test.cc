@@ -95,7 +95,8 @@ TEST(JobRequestBody, IsRefusedByName) {
   }
 }
 
-// Finds the options of a job in the source of the page's form.
+// Expects that the form of the web page has each option of a job, with the same choices and limits.
+// `page` is the source of the form.
 struct FormFinder {
   template <class T>
   void operator()(const Field& field, T&) {
@@ -209,7 +210,8 @@ TEST(Messages, AreLinesOfNamedMembers) {
       R"({"message":"warning","warning":{"code":"a","count":1,"message":"two\nlines","place":"b"}})");
 }
 
-// The service ignores broken and unknown lines, because it does not trust a job's process.
+// The service ignores malformed messages and unknown kinds of messages from a job's process,
+// because it does not trust the process.
 TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   for (const char* line :
        {"", "hello", "[]", "null", "{", "{\"a\":1}", "[0,1,2,3,4,5,6,7,8,9,10]", R"({"message":1})",
@@ -227,7 +229,8 @@ TEST(Messages, BrokenOrUnknownLinesAreIgnored) {
   }
 }
 
-// Members that no message knows are skipped without recursion, so deep nesting does no harm.
+// Unknown members of a message are skipped without recursion, so that deeply nested values cause no
+// stack overflow.
 TEST(Messages, MayHaveADeepMember) {
   constexpr size_t kDepth = 1'000'000;
   const std::string deep = std::string(kDepth, '[') + std::string(kDepth, ']');
@@ -263,7 +266,8 @@ TEST(Progress, IsPutTogetherFromMessages) {
               {"name":"n1","running":2,"built":1},{"name":"n3","running":0,"built":1}]})"));
 }
 
-// The progress includes the work of earlier attempts, but the rate does not.
+// The progress of a resumed stage includes the units of earlier attempts. The rate does not,
+// because this attempt did not do them.
 TEST(Progress, GoesOnWhereAnEarlierAttemptEnded) {
   LiveJob live(0);
   live.apply(StageBegun{"build", "subvolumes", 4'000'000});
@@ -278,8 +282,8 @@ TEST(Progress, GoesOnWhereAnEarlierAttemptEnded) {
   EXPECT_DOUBLE_EQ(advanced["rate"].get<double>() * wall_s, 1);
 }
 
-// Subvolumes that an earlier run has built count from the start. A split replaces a subvolume by
-// its parts.
+// The map counts subvolumes that an earlier run has built from the start, and each subvolume only
+// once. A split replaces a subvolume with its parts.
 TEST(Subvolumes, AreCountedAndListed) {
   SubvolumeMap map;
   const SubvolumeStatus built{1, {0, 0, 0}, 512, true, 10, 5, 100};
@@ -315,7 +319,8 @@ TEST(Subvolumes, AreCountedAndListed) {
   EXPECT_EQ(map.totals().bytes, 0u);
 }
 
-// The file lists a begun subvolume even if no other event follows.
+// The build updates the file with the list of subvolumes when it begins a subvolume, even if no
+// other event follows.
 TEST(Subvolumes, AreListedWhileOneIsBuilt) {
   const TemporaryFolder folder;
   const std::string path = folder.file("subvolumes.json");
@@ -330,7 +335,8 @@ TEST(Subvolumes, AreListedWhileOneIsBuilt) {
   EXPECT_NE(text.find("\"working\":[[512,0,0,512]]"), std::string::npos) << text;
 }
 
-// Neither dots nor symbolic links lead outside the scene's readable folders.
+// ConfinedFiles opens no file outside its readable folders, neither through dots in a path nor
+// through a symbolic link.
 TEST(ConfinedFilesTest, OpensNothingOutside) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.file("in/side"));
@@ -356,7 +362,8 @@ TEST(ConfinedFilesTest, OpensNothingOutside) {
   EXPECT_THROW(one.open_read(folder.file("in/side/b")), Error);
 }
 
-// The error does not reveal whether a file outside exists, and contains no path of the machine.
+// The error for a file outside the readable folders is the same whether the file exists or not, and
+// contains no path of the machine.
 TEST(ConfinedFilesTest, DoesNotTellWhatIsOutside) {
   const TemporaryFolder folder;
   std::filesystem::create_directories(folder.file("in"));
@@ -438,8 +445,8 @@ TEST_F(JobOutcome, ACrashIsReported) {
   EXPECT_EQ(job_.error->code, "out_of_memory");
 }
 
-// A stop can end the process before it reports anything. The job then counts as stopped, not as
-// failed.
+// If the service stops a job's process, and the process ends before it reports an outcome, the job
+// counts as stopped, not as failed.
 TEST_F(JobOutcome, AProcessThatWasStoppedAtOnceRunsAgain) {
   live_.stop();
   for (const ChildProcess::End& end :
@@ -467,8 +474,8 @@ TEST_F(JobOutcome, AStoppedRunGetsTheStateThatWasAskedFor) {
   EXPECT_EQ(job_.state, JobState::kSuspended);
 }
 
-// A run that ended by itself, with any outcome, shows that the job does not end the service. So its
-// interruptions are forgotten.
+// `interruptions` counts runs of a job during which the service ended. It is reset when a run ends
+// by itself, with any outcome, because the job then was not the cause.
 TEST_F(JobOutcome, ForgetsInterruptions) {
   job_.interruptions = 4;
   fail("no_space");

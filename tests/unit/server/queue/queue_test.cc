@@ -43,7 +43,7 @@ class Queue : public testing::Test {
   std::unique_ptr<JobQueue> queue_ = std::make_unique<JobQueue>(folder_.file("queue.db"));
 };
 
-// After a restart, every member of a job is unchanged.
+// When the queue is opened again, every member of a job is unchanged.
 TEST_F(Queue, StoresEveryMemberOfAJob) {
   const std::string id = post(7).id;
   queue_->change(id, [](Job& j) {
@@ -93,7 +93,8 @@ TEST_F(Queue, WaitsUntilAJobMayBeRetried) {
   EXPECT_TRUE(queue_->next(1000, 900, {}));
 }
 
-// After a crash of the service, running jobs are queued first, and canceling jobs become canceled.
+// When the queue recovers after a crash of the service, jobs that were running go to its front, and
+// jobs that were being canceled become canceled.
 TEST_F(Queue, RecoversWhatWasRunning) {
   const std::string waiting = post().id, running = post().id, stopping = post().id;
   set_state(running, JobState::kRunning);
@@ -150,7 +151,8 @@ TEST_F(Queue, RecordsEveryChangeOfState) {
   EXPECT_EQ(queue_->events_after(other, 0).size(), 1u);
 }
 
-// A job has a bounded number of events: a client can suspend and resume it any number of times.
+// The queue keeps only the last events of a job, because a client can suspend and resume a job any
+// number of times.
 TEST_F(Queue, KeepsTheLastEvents) {
   const std::string id = post().id, other = post().id;
   for (int i = 0; i < 400; ++i)
@@ -163,7 +165,7 @@ TEST_F(Queue, KeepsTheLastEvents) {
   EXPECT_EQ(queue_->events_after(other, 0).size(), 1u);
 }
 
-// If an edit throws, the job is unchanged.
+// If the function that edits a job throws, the stored job is unchanged.
 TEST_F(Queue, RollsBackAChangeThatFails) {
   const std::string id = post().id;
   EXPECT_EQ(refusal([&] {
@@ -218,7 +220,8 @@ TEST_F(Queue, LetsEndedJobsExpire) {
   EXPECT_EQ(queue_->expired(1e12, 100).size(), 2u);
 }
 
-// A client that submits many jobs cannot make the results of other clients expire.
+// The limit of finished jobs applies to each client, so a client that submits many jobs cannot make
+// the results of others expire.
 TEST_F(Queue, JobsExpireForThoseOfTheSamePosterOnly) {
   const auto end = [&](const std::string& poster, JobState state, double finished_s) {
     const std::string id = post().id;
@@ -236,7 +239,8 @@ TEST_F(Queue, JobsExpireForThoseOfTheSamePosterOnly) {
   EXPECT_EQ(std::count(expired.begin(), expired.end(), result), 0);
 }
 
-// The job that ended last is kept longest. Here, this is the job that was submitted first.
+// Jobs expire in the order in which they ended. Here, the job that was submitted first ended last,
+// so it is kept.
 TEST_F(Queue, TheJobThatEndedLastStays) {
   const std::string lengthy = post().id, quick = post().id;
   const auto succeed = [&](const std::string& id, double finished_s) {
@@ -250,7 +254,8 @@ TEST_F(Queue, TheJobThatEndedLastStays) {
   EXPECT_EQ(queue_->expired(0, 1), (std::vector<std::string>{quick}));
 }
 
-// If the clock was set back, a job does not wait until the old time.
+// not_before_s of a waiting job is ignored if it is further ahead than the longest possible wait:
+// the clock was then set back.
 TEST_F(Queue, DoesNotWaitForAClockThatWasSetBack) {
   const std::string id = post().id;
   queue_->change(id, [](Job& j) { j.not_before_s = 1e6 + 900; });
@@ -258,8 +263,8 @@ TEST_F(Queue, DoesNotWaitForAClockThatWasSetBack) {
   EXPECT_TRUE(queue_->next(1e6 - 1, 900, {}));
 }
 
-// If the service ends during every run of a job, the job fails in the end. After five such runs the
-// job is no longer queued at the front.
+// The service ends during every run of a job. Up to five times, the job is queued at the front.
+// After that it waits longer after each run, and finally fails.
 TEST_F(Queue, InterruptedRunsCountInTheEnd) {
   const std::string id = post().id, other = post().id;
   int runs = 0;
@@ -330,8 +335,8 @@ TEST_F(Queue, ReadsADamagedRow) {
   EXPECT_FALSE(queue_->find(id));
 }
 
-// If the queue's file is removed or replaced while the service runs, the queue detects this before
-// it accepts another job.
+// If the queue's file is removed or replaced while the service runs, the queue refuses the next
+// job.
 TEST_F(Queue, NoticesThatItsFileIsGone) {
   post();
   queue_->check_file();

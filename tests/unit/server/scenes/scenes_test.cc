@@ -14,7 +14,7 @@
 namespace voxdag::server {
 namespace {
 
-// Calls `before_removal` once, before the next removal of a file.
+// Calls before_removal() before the next removal of a file, and only once.
 class RemovalHook : public ForwardingFiles {
  public:
   RemovalHook() : ForwardingFiles(system_files()) {}
@@ -89,7 +89,8 @@ TEST_F(Scenes, ArriveInOneGo) {
   EXPECT_FALSE(store_->upload("a.glb"));
 }
 
-// Bytes that arrived before the connection broke are kept, even if the service restarts.
+// If the connection of an upload breaks, the bytes that have arrived are kept, even after a restart
+// of the service.
 TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
   {
     SceneUpload upload(*store_, "a.glb", 0, 10);
@@ -165,7 +166,7 @@ TEST_F(Scenes, AreListedByNameAndRemoved) {
   EXPECT_FALSE(store_->find("a.glb"));
 }
 
-// While an upload arrives, the scene cannot be removed.
+// A scene cannot be removed while an upload of it is in progress.
 TEST_F(Scenes, AreNotRemovedWhileTheyArrive) {
   SceneUpload upload(*store_, "a.glb", 0, 5);
   upload.write("hel");
@@ -194,8 +195,8 @@ TEST_F(Scenes, AreNotCompleteWithoutTheirBytes) {
     EXPECT_THROW(upload.publish(), Error);
   }
   EXPECT_FALSE(store_->find("a.glb"));
-  // The service crashed after it had recorded the digest, and the file is missing, correct or
-  // wrong.
+  // The service crashed after it had recorded the digest of a complete upload. The scene exists
+  // after the restart only if its file is complete: not if the file is missing or has other bytes.
   for (const char* left : {"", "hello", "hallo"}) {
     SCOPED_TRACE(left);
     { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
@@ -211,7 +212,7 @@ TEST_F(Scenes, AreNotCompleteWithoutTheirBytes) {
   }
 }
 
-// If the file of an upload is lost, or shorter than recorded, the upload starts over.
+// If the partial file of an upload is missing, or is shorter than recorded, the upload starts over.
 TEST_F(Scenes, StartOverIfTheirBytesAreLost) {
   const std::string part = folder_.file("parts/a.glb");
   for (const char* left : {"", "0123"}) {
@@ -232,8 +233,8 @@ TEST_F(Scenes, StartOverIfTheirBytesAreLost) {
   EXPECT_EQ(contents("a.glb"), "ok");
 }
 
-// After the database is lost, all scenes can be adopted. Files that no upload created are not
-// changed.
+// If the database is lost, the store does not start unless it may adopt the existing scenes. It
+// keeps files that no upload created.
 TEST_F(Scenes, StayWithoutTheirDatabase) {
   put("a.glb", "hello");
   store_.reset();
@@ -251,7 +252,8 @@ TEST_F(Scenes, StayWithoutTheirDatabase) {
   EXPECT_EQ(store_->list("", 10).size(), 2u);
   EXPECT_NE(log_.find("a.glb adopted"), std::string::npos) << log_;
   EXPECT_NE(log_.find("b.glb: adopted"), std::string::npos) << log_;
-  // It is unknown how many bytes of this part were synced, so the upload starts over or is removed.
+  // An adopted partial file has the offset 0, because it is unknown how many of its bytes are
+  // durable. A client must start over, or the file is removed later.
   const auto part = store_->upload("b.glb");
   ASSERT_TRUE(part);
   EXPECT_EQ(part->offset, 0u);
@@ -263,7 +265,7 @@ TEST_F(Scenes, StayWithoutTheirDatabase) {
     EXPECT_TRUE(system_files().exists(folder_.file(name))) << name;
 }
 
-// A removal that a crash interrupted is finished at the next start.
+// If a crash interrupted the removal of a scene, the next start finishes it.
 TEST_F(Scenes, AreRemovedInTheEnd) {
   put("a.glb", "hello");
   system_files().rename(store_->path("a.glb"), store_->path("a.glb") + kDeleted);
@@ -272,7 +274,8 @@ TEST_F(Scenes, AreRemovedInTheEnd) {
   EXPECT_FALSE(has_entries(system_files(), folder_.file("files")));
 }
 
-// A deletion that failed midway removes its marked files, not later uploads.
+// A deletion renames the scene's file to mark it. If the deletion then fails, only the marked file
+// is removed later, not a new scene with the same name.
 TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
   put("a.glb", "old");
   const std::string marked = store_->path("a.glb") + kDeleted;
@@ -286,7 +289,7 @@ TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
   EXPECT_FALSE(system_files().exists(marked));
   for (const bool at_start : {false, true}) {
     SCOPED_TRACE(at_start);
-    system_files().create(marked)->close();  // as if the mark had outlived the upload
+    system_files().create(marked)->close();  // as if it had not been removed with the upload
     at_start ? reopen() : store_->finish_removals();
     EXPECT_FALSE(system_files().exists(marked));
     ASSERT_TRUE(store_->find("a.glb"));
@@ -305,7 +308,7 @@ TEST_F(Scenes, KeepAnUploadFromAnEarlierDeletion) {
   EXPECT_NE(log_.find("scene a.glb: finished a deletion"), std::string::npos) << log_;
 }
 
-// The log reports uploads that the store drops, or cannot finish, when it starts.
+// When the store starts, it logs each upload that it drops because it cannot finish it.
 TEST_F(Scenes, AreNotDroppedSilently) {
   { SceneUpload(*store_, "a.glb", 0, 5).write("hello"); }
   system_files().remove(folder_.file("parts/a.glb"));
@@ -316,8 +319,8 @@ TEST_F(Scenes, AreNotDroppedSilently) {
   EXPECT_NE(log_.find("scene a.glb: failed to finish its upload"), std::string::npos) << log_;
 }
 
-// All bytes of a scene have arrived, but the service stopped before publish(), or publish() was not
-// called. An empty part completes the upload.
+// All bytes of a scene have arrived, but publish() was not called, because the service stopped or
+// the client disconnected. An upload of an empty part completes the scene.
 TEST_F(Scenes, AreFinishedByAnEmptyPart) {
   for (const std::optional<uint64_t> total : {std::optional<uint64_t>(5), {}}) {
     for (const bool stopped : {false, true}) {
@@ -348,7 +351,8 @@ TEST_F(Scenes, AreFinishedByAnEmptyPart) {
   }
 }
 
-// If the file of the database was removed, every call that would record something fails.
+// If the file of the database is removed while the service runs, each call that must record
+// something fails, and no scene changes.
 TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
   put("b.glb", "old");
   { SceneUpload(*store_, "old.glb", 0, 5).write("x"); }
@@ -365,14 +369,14 @@ TEST_F(Scenes, AreNotRecordedInADatabaseThatIsGone) {
   EXPECT_EQ(contents("b.glb"), "old");
 }
 
-// An upload that received no bytes leaves neither a record nor a file.
+// An upload that ends before its first byte leaves neither a record nor a file.
 TEST_F(Scenes, LeaveNothingWithoutABeginning) {
   { SceneUpload(*store_, "a.glb", 0, 5); }
   EXPECT_FALSE(store_->find("a.glb"));
   EXPECT_FALSE(system_files().exists(folder_.file("parts/a.glb")));
 }
 
-// An upload that continues while old uploads are removed is not removed.
+// If a client continues an old upload while old uploads are being removed, this upload is kept.
 TEST_F(Scenes, AreNotStaleOnceTheyGoOn) {
   for (const char* name : {"a.glb", "b.glb"}) SceneUpload(*store_, name, 0, 5).write("he");
   SqlDatabase(folder_.file("scenes.db"), SqlDatabase::Mode::kReadWrite)

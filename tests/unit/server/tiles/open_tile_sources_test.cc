@@ -1,4 +1,4 @@
-// Files that several viewers open, and changes of these files while they are open.
+// Tests OpenTileSources: files that several viewers open, and that change while they are open.
 #include "server/tiles/open_tile_sources.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,8 @@ class ViewedFilesTest : public testing::Test {
     token.cancel();
     return token;
   }
-  // True if the cameras are not computed yet: with a canceled token, computing them fails.
+  // True if manifest() must still compute the cameras. This fails with a canceled token, but
+  // returning a stored manifest does not.
   static bool needs_work(const FileTileSource& file) {
     try {
       file.manifest(canceled());
@@ -47,7 +48,7 @@ class ViewedFilesTest : public testing::Test {
   const std::string path_ = folder_.file("m.vdag");
 };
 
-// If several viewers open a file concurrently, they get the same object, so its manifest is
+// If several viewers open a file concurrently, they get one shared object, so that its manifest is
 // computed only once.
 TEST_F(ViewedFilesTest, AreOneForAllThatComeAtOnce) {
   for (int round = 0; round < 20; ++round) {
@@ -81,7 +82,8 @@ TEST_F(ViewedFilesTest, HaveManifestsThatOutliveThem) {
   EXPECT_EQ(again->manifest({}), manifest);
 }
 
-// A file with a failed read is opened again, because the next read may succeed.
+// After a read of a file has failed, the next open() maps the file again instead of returning the
+// shared object, because the file may be readable again.
 TEST_F(ViewedFilesTest, AreOpenedAgainIfTheyCouldNotBeRead) {
   class SameIdentity : public ForwardingFiles {
     struct Reader : ForwardingReader {

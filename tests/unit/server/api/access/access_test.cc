@@ -71,8 +71,8 @@ class AccessControlTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Requests from pages of other sites are rejected, even if the site's host name resolves to this
-// machine.
+// Without tokens, the service rejects requests from pages of other sites, even if the host name of
+// such a site resolves to this machine.
 TEST_F(AccessControlTest, RejectsOtherSitesWithoutTokens) {
   AccessControl access(config_, system_files());
   EXPECT_EQ(status(access, request("GET", {{"Host", "localhost:8080"}}), Role::kAdmin), 0);
@@ -135,7 +135,7 @@ TEST(ConcurrencyLimiterTest, ReleasesPermits) {
   EXPECT_TRUE(limiter.acquire("b"));
 }
 
-// One client cannot take all permits: each client has its own limit.
+// Each client has its own limit of permits, so one client cannot take all of them.
 TEST(ConcurrencyLimits, EachClientHasALimitOfItsOwn) {
   ConcurrencyLimiter limiter(3, 2);
   const auto first = limiter.acquire("a");
@@ -215,7 +215,7 @@ TEST(Configs, ErrorsNameTheMember) {
   }
 }
 
-// The service never listens on the network without access control.
+// A configuration that listens on the network without tokens is rejected.
 TEST(Configs, RejectTheNetworkWithoutTokens) {
   ServerConfig config;
   config.data_folder = "/tmp/x";

@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-// Statuses and codes match docs/errors.md and docs/api.md.
+// Each kind of error has the status and the code that docs/errors.md and docs/api.md list.
 TEST(PublicProblem, HasTheStatusAndCodeOfItsKind) {
   using Kind = RequestError::Kind;
   struct Row {

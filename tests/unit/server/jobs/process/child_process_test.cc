@@ -21,8 +21,9 @@ class HandlesTerm {
   void (*before_)(int);
 };
 
-// A stop that is requested before the child has started its program still ends the child. (Between
-// fork and exec, the signal would otherwise run this program's handler and be lost.)
+// request_stop() ends a child even before the child has started its program. Between fork and exec,
+// the child would otherwise handle the signal with this program's handler, and the stop would be
+// lost.
 TEST(ChildProcesses, AreStoppedBeforeTheirProgramBegins) {
   const TemporaryFolder folder;
   const HandlesTerm handler;

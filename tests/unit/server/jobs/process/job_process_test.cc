@@ -1,5 +1,5 @@
-// The process of a job on a machine with failures. Whatever fails, its reports and logs contain no
-// folder of the machine, and a failure that is caused by a scene names the scene.
+// Runs the process of a job with failures of the machine. Whatever fails, its reports and logs
+// contain no folder of the machine. If the scene causes the failure, the message names the scene.
 #include "server/jobs/process/job_process.h"
 
 #include <gtest/gtest.h>
@@ -50,7 +50,7 @@ class JobProcess : public testing::Test {
   void put_scene(const std::string& text) {
     write_file_atomically(system_files(), scene_path(), text);
   }
-  // Makes a new job folder with the task, as the service does.
+  // Replaces the job folder with a new one that contains only the task, as the service does.
   void start_over(JobTask::Kind kind = JobTask::Kind::kBuild) {
     remove_tree(system_files(), job_.path);
     std::filesystem::create_directories(job_.path);
@@ -78,7 +78,8 @@ class JobProcess : public testing::Test {
       return found;
     }
   };
-  // Runs the job in a separate process, because it changes its working directory.
+  // Runs the job in a child process, because a job changes its working directory. Checks that no
+  // output contains a folder of the machine. `plan` is the fault to inject.
   Run run(FaultPlan plan = {}) {
     const std::string output = folder_.file("stdout"), log = folder_.file("stderr");
     const pid_t child = fork();
@@ -99,7 +100,7 @@ class JobProcess : public testing::Test {
     std::ifstream in(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(in), {}};
   }
-  // Expects that the job fails and that its failure contains `part`.
+  // Expects that the run has failed and that its last reported failure contains `part`.
   void expect_failure(const std::string& part, const Run& run) {
     EXPECT_GT(run.exit_status, 0);
     EXPECT_NE(run.failure().find(part), std::string::npos) << run.failure() << "\n" << run.log;
@@ -123,7 +124,8 @@ TEST_F(JobProcess, BuildsAndReportsItsResult) {
             first.output.substr(first.output.rfind("{\"json\"")));
 }
 
-// The list of subvolumes of an earlier run is kept as long as that run's work folder.
+// The list of subvolumes of an earlier run is kept until the new run has a plan, if the earlier
+// run's work folder still exists. Otherwise it is removed.
 TEST_F(JobProcess, ListsNothingOfAnEarlierRunBeforeItsOwnPlan) {
   put_scene("no scene at all");
   write_file_atomically(system_files(), job_.subvolumes(), "the list");
@@ -148,7 +150,7 @@ TEST_F(JobProcess, NamesTheSceneAsTheClientDid) {
   expect_failure("scene.gltf", run());
 }
 
-// A scene cannot use files of the service or of the job as its buffer.
+// A scene whose buffer has the path of a file of the service or of the job is refused.
 TEST_F(JobProcess, ReadsNoFileOfTheServiceAsABuffer) {
   write_file_atomically(system_files(), folder_.file("secret.bin"), std::string(36, 'x'));
   for (const char* uri : {"../secret.bin", "task.json", "log"}) {
@@ -181,8 +183,8 @@ TEST_F(JobProcess, NamesNoFolderOfABrokenJob) {
   expect_failure("the job's folder", run());
 }
 
-// A job whose disk is full or fails from any operation on reports a failure. run() checks that no
-// message contains a folder of the machine.
+// If the disk is full, or fails, from any operation on, the job reports a failure. run() checks
+// that no message contains a folder of the machine.
 TEST_F(JobProcess, NamesNoFolderOfABrokenDisk) {
   for (const Fault fault : {Fault::kNoSpace, Fault::kIoError, Fault::kReadError}) {
     for (const JobTask::Kind kind : {JobTask::Kind::kBuild, JobTask::Kind::kPlan}) {

@@ -13,7 +13,7 @@
 namespace voxdag {
 namespace {
 
-// The occupied cells of a cube in the finished file. A cell's edge is a quarter of the cube's edge.
+// Computes the mask of the occupied cells of a cube from the finished file. A cube has 4^3 cells.
 class Cells {
  public:
   Cells(const voxdag_reader::File& file, const Cube& cube)
@@ -65,7 +65,8 @@ TEST_F(CoarseCubesTest, HaveTheCellsOfTheResult) {
   const voxdag_reader::File file(output_);
   for (const auto& [id, cube] : cubes.cubes())
     ASSERT_EQ(cube.brick, Cells(file, cube.cube).mask) << "subvolume " << id;
-  // After the artifacts are removed, the cubes that were read remain, and a new reader finds none.
+  // If the artifacts are removed, cubes that were already read remain, and a new reader finds no
+  // cubes.
   for (const auto& entry : std::filesystem::directory_iterator(work_))
     if (entry.path().extension() == ".vdseg") std::filesystem::remove(entry.path());
   const size_t before = cubes.cubes().size();

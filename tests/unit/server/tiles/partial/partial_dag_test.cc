@@ -10,7 +10,8 @@
 namespace voxdag::server {
 namespace {
 
-// True if a voxel of the DAG is set. Reads only the DAG's words.
+// True if the voxel is set in the DAG. Descends the words of the DAG without other code of the
+// service.
 bool is_set(const PartialDag& dag, uint32_t levels, uint64_t root, uint32_t x, uint32_t y,
             uint32_t z) {
   uint64_t at = root;
@@ -27,7 +28,7 @@ bool is_set(const PartialDag& dag, uint32_t levels, uint64_t root, uint32_t x, u
   return dag.levels()[levels - 2][at + bit / 32] >> (bit % 32) & 1;
 }
 
-// True if one of the parts has the voxel.
+// True if the voxel is in an occupied cell of one of the parts.
 bool has(const std::vector<PartialDag::Part>& parts, uint32_t levels, uint32_t x, uint32_t y,
          uint32_t z) {
   for (const auto& [cube, brick] : parts) {
@@ -41,7 +42,8 @@ bool has(const std::vector<PartialDag::Part>& parts, uint32_t levels, uint32_t x
   return false;
 }
 
-// Adds cubes of all sizes down to a brick; leaves some cubes out, as if they were not built.
+// Adds parts with random cells for cubes of all sizes, down to the size of a brick. Omits some
+// cubes, as if they were not built yet.
 void add_random_parts(const Cube& cube, uint32_t levels, std::mt19937& random,
                       std::vector<PartialDag::Part>& parts) {
   if (cube.level + 2 < levels && random() % 3 != 0) {
@@ -63,7 +65,7 @@ TEST(PartialDag, HasTheCellsOfItsParts) {
     }
     PartialDag dag(levels);
     std::shuffle(parts.begin(), parts.end(), random);
-    // Adding parts does not change what earlier roots contain.
+    // Adds some parts, then all parts. The first root must still contain only the first parts.
     std::vector<PartialDag::Part> first(parts.begin(), parts.begin() + 9);
     const auto old_root = dag.add(first), root = dag.add(parts);
     ASSERT_TRUE(old_root && root);

@@ -50,7 +50,7 @@ Cells cells_of(const query::DagView& dag, uint64_t root) {
   return cells;
 }
 
-// Lists the subvolumes of a build, as the job's process does, and cancels the build after some
+// Makes the list of subvolumes that a job's process writes, and cancels the build after `most`
 // built subvolumes.
 class ListedBuild : public NoProgress {
  public:
@@ -76,7 +76,8 @@ class ListedBuild : public NoProgress {
 
 class PartialViewsTest : public testing::Test {
  protected:
-  // Builds, and returns the list of the subvolumes.
+  // Builds until `most` subvolumes are built, and returns the list of all subvolumes. With `most`
+  // -1, builds completely.
   std::string build(int most) {
     BuildSpec spec = spheres_build(scene_, job_.result());
     spec.run.work_folder = job_.work();
@@ -94,7 +95,8 @@ class PartialViewsTest : public testing::Test {
     std::ofstream(path, std::ios::binary) << text;
   }
   auto look(PartialViews& views) { return views.tiles("job", job_, kResolution); }
-  // Requests the tiles until the condition holds, for at most ten seconds.
+  // Requests the partial view repeatedly, for at most ten seconds, until condition(manifest) holds.
+  // Returns the last view.
   template <class Condition>
   std::shared_ptr<const TileSource> look_until(PartialViews& views, const Condition& condition) {
     auto dag = look(views);
@@ -178,8 +180,8 @@ TEST_F(PartialViewsTest, BeginAgainWithAnotherScene) {
   const auto first = look(views);
   const auto before = nlohmann::json::parse(first->manifest({}));
   std::filesystem::remove_all(job_.work());
-  // Until the folder is read again, the old tiles are returned. Then, until there is a new plan,
-  // the error is kNotFound.
+  // The old view is returned until the folder is read again. Then the error is kNotFound until the
+  // folder has a new plan.
   ErrorCode code = ErrorCode::kInvalidInput;
   for (int i = 0; i < 1000 && code != ErrorCode::kNotFound; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -241,7 +243,7 @@ TEST_F(PartialViewsTest, AreForgottenWhenNobodyAsksForThem) {
   EXPECT_NO_THROW(views.json("other", job_, kResolution));
 }
 
-// The folder exists when it is checked, but is missing when it is read.
+// Simulates a work folder that exists when it is checked, and is missing when it is read.
 class VanishingFiles : public ForwardingFiles {
  public:
   VanishingFiles() : ForwardingFiles(system_files()) {}
@@ -257,7 +259,7 @@ TEST_F(PartialViewsTest, OfAFolderThatVanishesAreNotFound) {
   EXPECT_EQ(error_of([&] { look(views); }).code(), ErrorCode::kNotFound);
 }
 
-// A disk that hangs from some moment on.
+// A disk on which exists() blocks while `hangs` is true, until `go_on`.
 class HangingFiles : public ForwardingFiles {
  public:
   HangingFiles() : ForwardingFiles(system_files()) {}
