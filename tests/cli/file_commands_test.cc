@@ -239,7 +239,8 @@ TEST_F(FileCommands, PlanOfASolid) {
   EXPECT_NE(text.out.find("voxels inside"), std::string::npos) << text.out;
 }
 
-// status reports the state of the build in a work folder. If the folder does not exist, it fails.
+// status reports the state of the build in a work folder. The command fails if the folder does not
+// exist.
 TEST_F(FileCommands, StatusNames) {
   run_json({"build", "m.glb", "-r", "128", "-o", "m.vdag", "--keep-work"});
   const Json status = run_json({"status", "m.vdag.work"});

@@ -1,6 +1,5 @@
 // The file system of the machine. Counts reads, writes and syncs by path, and simulates a full disk
-// or a failing sync on request. Not thread-safe for the test: read the counters only while no build
-// runs.
+// or a failing sync on request. Tests may read the counters only while no build runs.
 #pragma once
 
 #include <algorithm>

@@ -16,7 +16,7 @@
 namespace voxdag {
 namespace {
 
-// Blocks the thread that writes a snapshot, once.
+// Blocks the first thread that writes a snapshot, until the test releases it.
 class BlockingProgress : public NoProgress {
  public:
   void end_stage() override {
@@ -66,7 +66,7 @@ TEST(JobProgressTest, WritesTheNewestSnapshot) {
   shown.wait_until_blocked();
   auto ended = std::async(std::launch::async, [&] { progress.end_stage(); });
   shown.wait_for_ended(1);
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // it waits for its turn now
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // now the thread waits for its turn
   progress.advance(7);
   shown.release();
   begun.get();
