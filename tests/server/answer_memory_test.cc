@@ -105,7 +105,8 @@ TEST_F(AnswerMemory, SlowReadersDoNotUseItUp) {
               static_cast<int>(peak >> 20), static_cast<int>(after >> 20));
 }
 
-// A list of long jobs has several pages, which together have every job once.
+// The list of 40 jobs with long requests is divided into pages of less than 700 KiB. Together they
+// have every job once.
 TEST_F(AnswerMemory, PagesOfLongJobsAreShort) {
   for (int i = 0; i < 40; ++i) post_large_job();
   std::string cursor;

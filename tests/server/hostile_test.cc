@@ -50,7 +50,7 @@ TEST_F(Hostile, MalformedRequestsAreRejected) {
   EXPECT_EQ(status("GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"), 200);
 }
 
-// The service refuses a request before it reads the body. It closes the connection, and does not
+// If the service refuses a request before it reads the body, it closes the connection. It does not
 // take the body for the next request.
 TEST_F(Hostile, AnUnreadBodyClosesTheConnection) {
   start();

@@ -46,7 +46,8 @@ class RunningService : public testing::Test {
   // Polls the condition for up to ten minutes. Returns whether it became true.
   bool until(const std::function<bool()>& condition);
   bool until_state(const std::string& id, const std::string& state);
-  // Returns "" if the answer is this problem; otherwise a description of the answer.
+  // Returns "" if the answer is an error with this status and code; otherwise a description of the
+  // answer.
   static std::string not_problem(const ClientResponse& response, int status,
                                  const std::string& code);
   std::string log();

@@ -292,7 +292,7 @@ TEST_F(ServiceFailures, LimitsOfOneClient) {
 
 // If the client that requested a plan disconnects, the plan is stopped.
 TEST_F(ServiceFailures, APlanEndsWithItsClient) {
-  // This script replaces the program. The plan takes longer than the test.
+  // Replaces the program that makes the plan with a script that takes longer than the test.
   write_file_atomically(system_files(), folder_.file("slow"), "#!/bin/sh\nexec sleep 600\n");
   std::filesystem::permissions(folder_.file("slow"), std::filesystem::perms::owner_all);
   config_.program = folder_.file("slow");

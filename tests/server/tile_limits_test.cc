@@ -1,5 +1,5 @@
-// The limits for requests of tiles: permits, the size of a tile, and a file that changes during a
-// request.
+// Tests the limits for requests of tiles: the number of permits, the size of a tile, and requests
+// during which the file changes.
 #include <sys/socket.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// A combined file has the bytes of the file that the oracle makes from the same voxels.
+// Tests that a combined file has the bytes of the oracle's file of the combined voxels.
 #include <array>
 
 #include "tests/unit/query/combine/combine_fixture.h"

@@ -167,7 +167,8 @@ TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
                  "8 (256");
 }
 
-// Every voxel of a checkerboard has six faces, and no two faces can be merged.
+// The number of rectangles decides the size of a .glb file. A checkerboard has the most: every
+// voxel has six faces, and no two faces can be merged.
 TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
   constexpr uint32_t kLevels = 6;
   GlobalFileWriter writer(system_files(), folder_.file("a.vdag"),

@@ -53,8 +53,8 @@ TEST_F(ExportSharing, VoxHasOneModelAndItsPlaces) {
             std::vector<std::string>{"z is up: a voxel (x, y, z) is at (x, -z, y); 64 instances"});
 }
 
-// An exported file has one word for the root and one word for each child pointer of the DAG, so
-// equal subtrees are shared.
+// An exported file has one word for the root and one word for each child pointer of the DAG. This
+// count shows that equal subtrees are exported once.
 TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(run("voxel").notes, std::vector<std::string>{});
   const auto json = nlohmann::json::parse(bytes_);
