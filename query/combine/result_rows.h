@@ -1,9 +1,10 @@
 // Records that pass between the levels while two DAGs are combined.
 //
-// A pair is two cubes of the same level and position, one of each file. The pairs of a level are
-// numbered in the order of their offsets `a`, then `b` (NodePair). A *place* is a child of a pair:
-// 8 * number of the pair + index of the child. The result of a place is the node of the new file at
-// this place, or empty.
+// A *pair* is two cubes of the same level and position, one of each file. It is stored as a
+// NodePair: `a` and `b` are the word offsets of the cubes' nodes in the first and the second file.
+// The pairs of a level are sorted by `a`, then by `b`, and numbered in this order. A *place* is a
+// child of a pair: 8 * number of the pair + index of the child. The result of a place is the node
+// of the new file at this place, or empty.
 #pragma once
 
 #include <cstdint>

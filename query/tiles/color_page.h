@@ -37,8 +37,11 @@ class ColorPages {
   ColorPages(const ColorPages&) = delete;  // the cursor refers to a member of this object
 
   // Returns the words of the page; only one word if none of the page's cells is set. Throws
-  // Error{kNotFound} if the file has no colors of this level or the grid has no such cells,
-  // Error{kCorrupt}, and DamagedBlock if a block needed for the page is damaged.
+  //   Error{kNotFound}  if the file has no colors of this level, or the page is outside the grid;
+  //   DamagedBlock      if a block needed for the page does not match its checksum (only if
+  //                     `blocks` is not null);
+  //   Error{kCorrupt}   if a node has an invalid offset, or the color section does not fit the DAG,
+  //                     for example a set cell has no color.
   std::vector<uint32_t> encode(const ColorPageAddress& address);
 
  private:

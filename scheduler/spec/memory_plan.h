@@ -1,5 +1,6 @@
 // How a build divides its memory budget (--memory). The table lists every fraction of the budget,
-// or the struct that defines the fraction.
+// or the struct that defines the fraction. A part is *charged* if a MemoryBudget counts it. The
+// last column names the class or stage that requests the memory.
 //
 //   stage         part                              size                         charged by
 //   ------------  --------------------------------  ---------------------------  -------------
@@ -12,30 +13,32 @@
 //   partition     half-filled chunks of triangles   1/8                          nobody
 //   rows          sample rows of a solid's subvolume,
 //                 for every thread                  1/64 each, up to 1/2 of free RowSums
-//                   columns of sample rows          up to 3/2 of that            RowColumn
+//                   columns of sample rows          up to 3/2 of the row above   RowColumn
 //   estimate      pilot builds, consecutive         3/4 of free                  Backend
 //   build         WorkerMemory, for every worker    free / workers
 //                   segment writer                  1.5 MiB                      SegmentWriter
 //                   pages that a backend retains    8 MiB                        nobody
 //                   half-filled chunks of a split   512 KiB                      nobody
-//                   share: Backend::build()         the rest                     Backend
+//                   share of Backend::build()       the rest                     Backend
 //                     sample rows of a solid        twice 1/64 of the budget     executor
 //                     tables made in advance        1/4 of its free part         BackendMemory
-//                     each table of the plane memo  1/16, 1/8 of free            BackendMemory
+//                     each table of the plane memo  1/16 of the share,           BackendMemory
+//                                                     at most 1/8 of free
 //                     block memo                    1/16 of free                 BackendMemory
 //                     more retained pages           1/8, up to 128 MiB           nobody
 //                     cache key, before build()     7/8 of the share             ArtifactCache
 //   enclose       kept labels of parts              kept_label_bytes()           SpaceLabels
 //                 WorkerMemory, for every worker    7/8 of the rest / workers
 //                   segment writer                  1.5 MiB                      SegmentWriter
-//                   labels of a part                1/3 of the share             SpaceLabels
-//                   the part filled                 the share                    SubDagTables
+//                   labels of a part                1/3 of the share; 1/2 for    SpaceLabels
+//                                                     parts of the smallest edge
+//                   tables of a part being filled   the share                    SubDagTables
 //                   quadtree of a face              1/16 of the share            nobody
 //                 components at all faces           the rest                     ComponentSets
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
 //                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet
-//                 ColorMemory, for every worker     free / workers
+//                 ColorMemory, for every worker     7/8 of free / workers
 //                   a region, and the encoded       1/2, 12 to 46 MiB            CubeBaker
 //                     regions of its cube
 //                   other attributes of a region    16 MiB or more, if any       CubeBaker
@@ -48,10 +51,12 @@
 //
 // "Free" is the part of the budget still available when a stage allocates. A fraction without "of"
 // is a fraction of the budget, or, in an indented row, of the part above. "The rest" is the memory
-// left by the rows above. Two kinds of memory are not charged: the parts marked "nobody" above, and
-// lists that grow with the number of subvolumes and frames. These lists are the artifact indexes of
-// one merge pass (56 bytes per frame; the hash partition leaves 1/16 of the budget for them) and
-// the chunk lists of spilled triangles.
+// left by the rows above. The color stage leaves 1/8 of its free memory for the directories and
+// coarser levels of the attribute sections, which AttributeSectionWriter charges. Two kinds of
+// memory are not charged: the parts marked "nobody" above, and lists that grow with the number of
+// subvolumes and frames. These lists are the artifact indexes of one merge pass (56 bytes per
+// frame; the hash partition leaves 1/16 of the budget for them) and the chunk lists of spilled
+// triangles.
 #pragma once
 
 #include <algorithm>

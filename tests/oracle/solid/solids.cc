@@ -213,7 +213,9 @@ class SolidMaker {
       add_tetrahedron(out, p);
     }
   }
-  // Returns an offset that is often one of few numbers, so that edges have slopes of 1 and -1.
+  // Returns size_ / 4 - 1 or its negative in half of the calls, otherwise a random odd offset. If
+  // the offsets of two axes have the same absolute value, the edge has slope 1 or -1 in the plane
+  // of these axes.
   int64_t tie_offset() {
     const int64_t offset = random_.coin() ? size_ / 4 - 1 : random_.odd(1, size_ / 4);
     return random_.coin() ? offset : -offset;

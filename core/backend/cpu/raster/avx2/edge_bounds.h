@@ -91,8 +91,9 @@ constexpr BoundOrder kBoundOrder;
 class EdgeBounds {
  public:
   // If `bound_first` is true, x (the bounded coordinate) has the edges' factor a, and k (the row)
-  // has the factor b. Otherwise x has the factor b, and k has the factor a. Adds `below_more` to
-  // all bounds from below and `over_more` to all bounds from above.
+  // has the factor b. Otherwise x has the factor b, and k has the factor a. Adds the whole numbers
+  // `below_more` and `over_more` to the values of below() and over(). Callers choose them so that
+  // the bounds of voxels in a tile are not negative.
   VOXDAG_INLINE EdgeBounds(const Edge (&edges)[3], bool bound_first, double below_more,
                            double over_more) {
     const EdgeLanes lanes(edges);
@@ -129,8 +130,12 @@ class EdgeBounds {
     return out;
   }
 
-  // below() returns the largest y of the edges that bound x from below, over() the largest y of the
-  // edges that bound x from above. The values are not rounded yet. Each lane is one of four rows k.
+  // Bounds of x in four rows: each lane of `k` is the number of a row. y is the y of the file's
+  // comment, before rounding. An edge with up = 0 counts in one of the two functions.
+  //   below()  returns below_more + the largest y of the edges with up > 0. So a voxel inside has
+  //            x > floor(below() - below_more).
+  //   over()   returns over_more + the largest y of the edges with up < 0, which bound -x. So a
+  //            voxel inside has -x > floor(over() - over_more).
   VOXDAG_INLINE __m256d below(__m256d k) const {
     return _mm256_max_pd(_mm256_fmadd_pd(slope_[0], k, start_[0]),
                          _mm256_fmadd_pd(slope_[1], k, start_[1]));
