@@ -32,13 +32,15 @@ constexpr SceneFormat kFormats[] = {
     {"OBJ", kObjEndings, obj::is_obj, obj::open_obj},
     {"STL", kStlEndings, stl::is_stl, stl::open_stl},
     // This row is last, because its sniff() accepts almost any text in a file with one of the
-    // endings.
+    // endings, also a Git LFS pointer or a web page.
     {"text points", kTextPointEndings, points::is_text_points, points::open_text_points},
 };
 
 const SceneFormat& format_of(const ReadableFile& file) {
-  for (const SceneFormat& format : kFormats)
+  for (const SceneFormat& format : kFormats) {
+    if (&format == std::end(kFormats) - 1 && is_other_text(file)) break;
     if (format.sniff(file)) return format;
+  }
   refuse_unknown_file(file);
 }
 

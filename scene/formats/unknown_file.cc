@@ -1,7 +1,6 @@
 #include "scene/formats/unknown_file.h"
 
 #include <algorithm>
-#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -37,6 +36,7 @@ struct KnownFormat {
   std::string_view bytes;
   const char* name;  // follows "is" in the message: "compressed by gzip"
   const char* remedy = "";
+  bool is_word = false;  // a blank or a line end follows the bytes
 };
 
 // The first matching row is used, so longer patterns come before their prefixes.
@@ -67,9 +67,9 @@ constexpr KnownFormat kKnown[] = {
     {0, ".PCD", "a PCD point cloud", "convert it to PLY"},
     {0, "ASTM-E57", "an E57 point cloud", "convert it to PLY or LAS"},
     {0, "#VRML", "a VRML file", kConvert},
-    {0, "OFF", "an OFF file", kImport},
-    {0, "COFF", "an OFF file", kImport},
-    {0, "NOFF", "an OFF file", kImport},
+    {0, "OFF", "an OFF file", kImport, true},
+    {0, "COFF", "an OFF file", kImport, true},
+    {0, "NOFF", "an OFF file", kImport, true},
     {0, "xof 0", "a DirectX file", kImport},
     {0, "AC3D", "an AC3D file", kImport},
     {0, "MS3D", "a MilkShape 3D file", kImport},
@@ -101,6 +101,31 @@ std::string contents_of_markup(std::string_view text) {
   return "an XML file";
 }
 
+// Returns the first bytes of a file, which identify its format.
+std::string read_begin(const ReadableFile& file) {
+  std::string begin(std::min<uint64_t>(file.size(), kFirstBytes), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(begin)));
+  return begin;
+}
+
+// True if the file has the bytes of the format.
+bool matches(const KnownFormat& known, std::string_view begin) {
+  if (begin.size() <= known.offset || !begin.substr(known.offset).starts_with(known.bytes))
+    return false;
+  const size_t end = known.offset + known.bytes.size();
+  return !known.is_word || end == begin.size() || is_blank(begin[end]) || is_line_end(begin[end]);
+}
+
+// True if no other text is likely to begin with the bytes of the format.
+bool is_distinct_in_text(const KnownFormat& known) {
+  return known.offset == 0 && (known.is_word || known.bytes.size() >= 5);
+}
+
+bool is_markup(std::string_view begin) {
+  const size_t text = begin.find_first_not_of(" \t\r\n");
+  return text != begin.npos && begin[text] == '<';
+}
+
 // Returns the file's format and a remedy for the error message, such as "is compressed by gzip:
 // unpack it first". `begin` is the beginning of the file.
 std::string describe(std::string_view begin) {
@@ -108,11 +133,11 @@ std::string describe(std::string_view begin) {
   const ImageFormat* const image = image_format_of(std::as_bytes(std::span(begin)));
   if (image && image->is_image) return std::string("is ") + image->name;
   for (const KnownFormat& known : kKnown)
-    if (begin.size() > known.offset && begin.substr(known.offset).starts_with(known.bytes))
+    if (matches(known, begin))
       return "is " + std::string(known.name) + (*known.remedy ? ": " : "") + known.remedy;
   const size_t text = begin.find_first_not_of(" \t\r\n");
   if (text == begin.npos) return "begins with blanks only";
-  if (begin[text] == '<') return "is " + contents_of_markup(begin.substr(text));
+  if (is_markup(begin)) return "is " + contents_of_markup(begin.substr(text));
   return "has an unknown format; it begins with " + printable(begin.substr(text), 16);
 }
 
@@ -129,11 +154,15 @@ std::string list_formats() {
 
 }  // namespace
 
+bool is_other_text(const ReadableFile& file) {
+  const std::string begin = read_begin(file);
+  return is_markup(begin) || std::ranges::any_of(kKnown, [&](const KnownFormat& known) {
+           return is_distinct_in_text(known) && matches(known, begin);
+         });
+}
+
 void refuse_unknown_file(const ReadableFile& file) {
-  std::array<char, kFirstBytes> begin{};
-  const auto size = static_cast<size_t>(std::min<uint64_t>(file.size(), begin.size()));
-  file.read_at(0, std::as_writable_bytes(std::span(begin.data(), size)));
-  refuse(file.path(), describe({begin.data(), size}) + "; expected a scene: " + list_formats());
+  refuse(file.path(), describe(read_begin(file)) + "; expected a scene: " + list_formats());
 }
 
 }  // namespace voxdag

@@ -180,6 +180,8 @@ MaterialSource read_material(const tinygltf::Model& model, int index) {
     use = read_use(in.pbrMetallicRoughness.baseColorTexture);
   }
   use_emission(in, factor, use, out);
+  // No alpha reaches a cutoff above 1, so everything is hidden. An intensity cannot be above 1.
+  if (out.material.alpha_mode == AlphaMode::kMask && in.alphaCutoff > 1) factor[3] = 0;
   for (size_t c = 0; c < factor.size(); ++c) out.material.factor[c] = intensity_of(factor[c]);
   read_texture(model, use, out.only_emits ? "emissive" : "base color", out);
   return out;

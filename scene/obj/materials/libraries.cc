@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "core/base/error.h"
+#include "scene/lfs_pointer.h"
 #include "scene/messages.h"
 #include "scene/text/characters.h"
 #include "scene/text/side_files.h"
@@ -53,6 +54,7 @@ class LibraryList {
     std::unique_ptr<ReadableFile> file;
     try {
       file = open_side_file(files_, obj_.file().path(), name);
+      refuse_lfs_pointer(*file, "the library of materials");
     } catch (const Error& error) {
       if (from) warn(*from, name, error.message());
       return false;

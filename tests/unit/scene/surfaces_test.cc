@@ -177,6 +177,19 @@ TEST(Materials, FactorsAndAlphaModes) {
   EXPECT_EQ(surfaces_of(*open.source).at(0).material, 1u);
 }
 
+// No alpha reaches a cutoff above 1, so such a material is hidden whatever its texture.
+TEST(Materials, CutoffsAboveOne) {
+  SceneBuilder scene = one_triangle();
+  for (const double cutoff : {1.0, 1.0000001, 2.0, 1e9})
+    scene.root["materials"].push_back({{"alphaMode", "MASK"}, {"alphaCutoff", cutoff}});
+  const auto all = materials_of(scene);
+  ASSERT_GE(all.size(), 4u);
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(all[i].alpha_cutoff, 65535);
+    EXPECT_EQ(all[i].factor[3], i == 0 ? 65535 : 0);
+  }
+}
+
 // Members of the first material of textured(), and the expected material. `vertex_red` is the
 // expected red of a corner whose vertex color is half red.
 struct EmissiveCase {

@@ -8,6 +8,8 @@ namespace voxdag {
 namespace {
 
 using test::error_of_file;
+using test::OpenScene;
+using test::triangles_of;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -42,6 +44,29 @@ TEST(UnknownFile, IsNamedByItsFirstBytes) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
     EXPECT_THAT(error.message(), AllOf(HasSubstr(message), HasSubstr("glTF (.glb, .gltf); PLY")));
   }
+}
+
+Error error_of_text(const std::string& file) {
+  OpenScene open("0 0 0\n");
+  open.files.contents["a.csv"] = file;
+  try {
+    triangles_of(*open_scene(open.files, {"a.csv"}, {}, open.budget, open.cancel));
+  } catch (const Error& error) {
+    return error;
+  }
+  return Error(ErrorCode::kInvalidInput, "");
+}
+
+// Text of another format is named as well if the file has an ending of text points.
+TEST(UnknownFile, OtherTextsAreNotPoints) {
+  EXPECT_THAT(error_of_text("version https://git-lfs.github.com/spec/v1\noid sha256:0").message(),
+              HasSubstr("a.csv: is a Git LFS pointer, not the file itself: run git lfs pull"));
+  EXPECT_THAT(error_of_text("<!DOCTYPE html><title>404</title>").message(),
+              HasSubstr("is a web page"));
+  EXPECT_THAT(error_of_text("OFF\n8 6 0\n").message(), HasSubstr("is an OFF file"));
+  EXPECT_THAT(error_of_text("# .PCD v.7\nVERSION .7\n").message(), HasSubstr("is a PCD point"));
+  EXPECT_EQ(error_of_text("OFFSET,x,y,z\n9,1,2,3\n").message(), "");
+  EXPECT_EQ(error_of_text("MM,x,y,z\n9,1,2,3\n").message(), "");
 }
 
 // A file that begins with JSON, even after white space or a byte order mark, is read as glTF.

@@ -250,6 +250,16 @@ TEST(Obj, MissingFilesAreWarnings) {
   EXPECT_EQ(surfaces_of(*open.source).size(), 1u);
 }
 
+TEST(Obj, LfsPointersAreNotLibraries) {
+  const WithLibraries open(
+      "mtllib a.mtl\n" + kTriangleLines + "usemtl a\nf 1/1 2/2 3/3\n",
+      {{"folder/a.mtl", "version https://git-lfs.github.com/spec/v1\noid sha256:0\n"}});
+  const SceneMaterials materials = open.source->materials();
+  EXPECT_THAT(texts_of(materials.warnings.list()),
+              ElementsAre(HasSubstr("a.mtl is a Git LFS pointer, not the file itself"),
+                          HasSubstr("material \"a\"")));
+}
+
 // --- Recognition ------------------------------------------------------------------------------
 
 TEST(Obj, IsRecognizedByItsStatements) {
