@@ -121,9 +121,8 @@ bool is_distinct_in_text(const KnownFormat& known) {
   return known.offset == 0 && (known.is_word || known.bytes.size() >= 5);
 }
 
-bool is_markup(std::string_view begin) {
-  const size_t text = begin.find_first_not_of(" \t\r\n");
-  return text != begin.npos && begin[text] == '<';
+std::string_view without_leading_space(std::string_view text) {
+  return text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
 }
 
 // Returns the file's format and a remedy for the error message, such as "is compressed by gzip:
@@ -135,10 +134,10 @@ std::string describe(std::string_view begin) {
   for (const KnownFormat& known : kKnown)
     if (matches(known, begin))
       return "is " + std::string(known.name) + (*known.remedy ? ": " : "") + known.remedy;
-  const size_t text = begin.find_first_not_of(" \t\r\n");
-  if (text == begin.npos) return "begins with blanks only";
-  if (is_markup(begin)) return "is " + contents_of_markup(begin.substr(text));
-  return "has an unknown format; it begins with " + printable(begin.substr(text), 16);
+  const std::string_view text = without_leading_space(begin);
+  if (text.empty()) return "begins with blanks only";
+  if (text.starts_with('<')) return "is " + contents_of_markup(text);
+  return "has an unknown format; it begins with " + printable(text, 16);
 }
 
 std::string list_formats() {
@@ -156,7 +155,8 @@ std::string list_formats() {
 
 bool is_other_text(const ReadableFile& file) {
   const std::string begin = read_begin(file);
-  return is_markup(begin) || std::ranges::any_of(kKnown, [&](const KnownFormat& known) {
+  return without_leading_space(begin).starts_with('<') ||
+         std::ranges::any_of(kKnown, [&](const KnownFormat& known) {
            return is_distinct_in_text(known) && matches(known, begin);
          });
 }
