@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/host_device.h"
+#include "core/dag/brick.h"
 
 namespace voxdag::query {
 namespace {
@@ -11,15 +12,6 @@ namespace {
 // Cube `index` is one of 2 x 2 x 2 cubes. Returns its position on `axis`, 0 or 1.
 constexpr int64_t axis_bit(size_t index, size_t axis) {
   return static_cast<int64_t>(index >> (2 - axis) & 1);
-}
-
-// Returns the number of the bit that stands for a voxel in a brick's mask. The coordinates, 0 to 3,
-// are the voxel's position in the brick.
-constexpr int voxel_bit(int64_t x, int64_t y, int64_t z) {
-  const auto octant = [](int64_t high, int64_t middle, int64_t low) {
-    return static_cast<int>(4 * high + 2 * middle + low);
-  };
-  return 8 * octant(x >> 1, y >> 1, z >> 1) + octant(x & 1, y & 1, z & 1);
 }
 
 }  // namespace
@@ -123,14 +115,15 @@ void MovedLevels::expand_groups(const Open& level, Open& below) const {
 uint64_t MovedLevels::brick(const Cubes& cubes) const {
   uint64_t masks[8], mask = 0;
   for (size_t i = 0; i < 8; ++i) masks[i] = cubes[i] == kNoNode ? 0 : input_.brick(cubes[i]);
-  const int64_t rx = -offset_[0] & 3, ry = -offset_[1] & 3, rz = -offset_[2] & 3;
-  for (int64_t x = 0; x < 4; ++x)
-    for (int64_t y = 0; y < 4; ++y)
-      for (int64_t z = 0; z < 4; ++z) {
-        const int64_t fx = x + rx, fy = y + ry, fz = z + rz;
+  const auto within_brick = [&](size_t axis) { return static_cast<int>(-offset_[axis] & 3); };
+  const int rx = within_brick(0), ry = within_brick(1), rz = within_brick(2);
+  for (int x = 0; x < kBrickEdge; ++x)
+    for (int y = 0; y < kBrickEdge; ++y)
+      for (int z = 0; z < kBrickEdge; ++z) {
+        const int fx = x + rx, fy = y + ry, fz = z + rz;
         const auto from = static_cast<size_t>(4 * (fx >> 2) + 2 * (fy >> 2) + (fz >> 2));
-        const uint64_t bit = masks[from] >> voxel_bit(fx & 3, fy & 3, fz & 3) & 1;
-        mask |= bit << voxel_bit(x, y, z);
+        const uint64_t bit = masks[from] >> brick_bit(fx & 3, fy & 3, fz & 3) & 1;
+        mask |= bit << brick_bit(x, y, z);
       }
   return mask;
 }

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "core/dag/brick.h"
 
 namespace voxdag::query {
 namespace {
@@ -27,10 +28,9 @@ int64_t halves_of(double number, const std::string& text) {
   return static_cast<int64_t>(2 * number);
 }
 
-// Returns the position, within its brick, of the voxel that a bit of the brick's mask stands for.
-constexpr std::array<int64_t, 3> voxel_of_bit(int bit) {
-  const auto axis = [&](int shift) { return (bit >> (shift + 3) & 1) * 2 + (bit >> shift & 1); };
-  return {axis(2), axis(1), axis(0)};
+// Returns the position of a cube on an axis, in cubes of its size. `cube` is its code.
+constexpr int64_t cube_index(uint64_t cube, int axis) {
+  return static_cast<int64_t>(cube >> kIndexBits * (2 - axis) & ((uint64_t{1} << kIndexBits) - 1));
 }
 
 constexpr int64_t squared(int64_t x) { return x * x; }
@@ -100,11 +100,8 @@ std::array<uint64_t, 8> Shape::children(uint32_t levels, uint32_t level, uint64_
   std::array<uint64_t, 8> children;
   for (int child = 0; child < 8; ++child) {
     Position index;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto coarse =
-          static_cast<int64_t>(cube >> kIndexBits * (2 - axis) & ((uint64_t{1} << kIndexBits) - 1));
-      index[static_cast<size_t>(axis)] = 2 * coarse + (child >> (2 - axis) & 1);
-    }
+    for (int axis = 0; axis < 3; ++axis)
+      index[static_cast<size_t>(axis)] = 2 * cube_index(cube, axis) + (child >> (2 - axis) & 1);
     children[static_cast<size_t>(child)] = this->cube(index, edge);
   }
   return children;
@@ -113,10 +110,10 @@ std::array<uint64_t, 8> Shape::children(uint32_t levels, uint32_t level, uint64_
 uint64_t Shape::brick(uint64_t cube) const {
   uint64_t mask = 0;
   for (int bit = 0; bit < 64; ++bit) {
-    Position voxel = voxel_of_bit(bit);
-    for (size_t axis = 0; axis < 3; ++axis)
-      voxel[axis] += 4 * static_cast<int64_t>(cube >> kIndexBits * (2 - axis) &
-                                              ((uint64_t{1} << kIndexBits) - 1));
+    Position voxel;
+    for (int axis = 0; axis < 3; ++axis)
+      voxel[static_cast<size_t>(axis)] =
+          kBrickEdge * cube_index(cube, axis) + brick_coordinate(bit, axis);
     const uint64_t cover = is_box_ ? box_cover(voxel, voxel) : sphere_cover(voxel, voxel);
     if (cover == kFull) mask |= uint64_t{1} << bit;
   }

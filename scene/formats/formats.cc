@@ -25,6 +25,10 @@ constexpr std::string_view kStlEndings[] = {".stl"};
 constexpr std::string_view kLasEndings[] = {".las"};
 constexpr std::string_view kTextPointEndings[] = {".xyz", ".txt", ".csv"};
 
+bool is_points(const ReadableFile& file) {
+  return !is_other_text(file) && points::is_text_points(file);
+}
+
 constexpr SceneFormat kFormats[] = {
     {"glTF", kGltfEndings, gltf::is_gltf, gltf::open_gltf},
     {"PLY", kPlyEndings, ply::is_ply, ply::open_ply},
@@ -32,15 +36,13 @@ constexpr SceneFormat kFormats[] = {
     {"OBJ", kObjEndings, obj::is_obj, obj::open_obj},
     {"STL", kStlEndings, stl::is_stl, stl::open_stl},
     // This row is last, because its sniff() accepts almost any text in a file with one of the
-    // endings, also a Git LFS pointer or a web page.
-    {"text points", kTextPointEndings, points::is_text_points, points::open_text_points},
+    // endings.
+    {"text points", kTextPointEndings, is_points, points::open_text_points},
 };
 
 const SceneFormat& format_of(const ReadableFile& file) {
-  for (const SceneFormat& format : kFormats) {
-    if (&format == std::end(kFormats) - 1 && is_other_text(file)) break;
+  for (const SceneFormat& format : kFormats)
     if (format.sniff(file)) return format;
-  }
   refuse_unknown_file(file);
 }
 
