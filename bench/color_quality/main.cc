@@ -102,9 +102,7 @@ void compare(const Arguments& arguments) {
   const auto scene = open_scene(system_files(), {arguments.files[0]}, {}, budget, cancel);
   const SceneMaterials materials = scene->materials();
   const SampledCells cells(*file, arguments.cells);
-  const auto origin = file->origin();
-  const Grid grid =
-      Grid::given({origin[0], origin[1], origin[2]}, file->edge(), file->grid_levels());
+  const Grid grid = grid_of(*file);
   const Neighborhood found = find_surfaces(*scene, grid, cells);
   const SceneLooks looks(materials, budget);
   std::vector<oracle::Surface> surfaces;
