@@ -68,7 +68,8 @@ std::optional<FixedSurface> SurfaceRecords::next() {
   if (in_.ok() && in_.left() == 0) return std::nullopt;
   const uint8_t flags = in_.get<uint8_t>();
   if (flags >= 2 * kFlipped)
-    throw DamagedTriangles("a stored surface has the flags " + std::to_string(flags) +
+    throw DamagedTriangles("record " + std::to_string(count_) +
+                           " of the stored triangles has the flags " + std::to_string(flags) +
                            ": expected at most " + std::to_string(2 * kFlipped - 1));
   FixedSurface surface;
   surface.is_flipped = (flags & kFlipped) != 0;
@@ -82,8 +83,9 @@ std::optional<FixedSurface> SurfaceRecords::next() {
     for (SurfaceCorner& corner : surface.corners)
       for (uint16_t& value : corner.color) value = in_.get<uint16_t>();
   if (!in_.ok())
-    throw DamagedTriangles(
-        "the stored surfaces end within a record: expected a complete last record");
+    throw DamagedTriangles("record " + std::to_string(count_) +
+                           " of the stored triangles is cut off: expected a complete record");
+  ++count_;
   return surface;
 }
 

@@ -45,6 +45,7 @@ class SurfaceRecords {
 
  private:
   ByteSource in_;
+  uint64_t count_ = 0;
 };
 
 // Writes surface records to the lists of a store. The incomplete chunks of all lists take at most

@@ -47,11 +47,10 @@ class AsciiRows : public Rows {
   std::string_view word(uint64_t row) {
     std::string_view text = text_.word();
     if (!text.empty()) return text;
-    note_irregular(row, "ends before its properties do");
+    note_irregular(row, "has too few values on its line");
     text_.begin_row(text_.offset());
     text = text_.word();
-    if (text.empty())
-      refuse(row, "ends before its properties do, expected a value for each of them");
+    if (text.empty()) refuse(row, "has too few values, expected one for each property");
     return text;
   }
   int64_t integer(uint64_t row) {

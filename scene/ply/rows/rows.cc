@@ -150,7 +150,7 @@ class BinaryRows : public Rows {
   }
 
   [[noreturn]] void refuse_end(uint64_t row) const {
-    refuse(row, "ends past the " + std::to_string(file_.size()) + " bytes of the file");
+    refuse(row, "is cut off: the file ends after " + std::to_string(file_.size()) + " bytes");
   }
 
   const bool is_big_endian_;

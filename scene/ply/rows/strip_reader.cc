@@ -92,7 +92,7 @@ int64_t StripReader::list_count(const Property& property) {
   const int64_t count = integer(property.count_type);
   if (count < 0 || static_cast<uint64_t>(count) > file_.size())
     refuse("has a list of " + std::to_string(count) + " entries, expected 0 to " +
-           std::to_string(file_.size()) + ", the bytes of the file");
+           std::to_string(file_.size()) + ", because the file has that many bytes");
   return count;
 }
 
@@ -114,13 +114,13 @@ void StripReader::skip(Type type, uint64_t count) {
   }
   at_.offset += count * bytes_of(type);
   if (at_.offset > file_.size())
-    refuse("ends past the " + std::to_string(file_.size()) + " bytes of the file");
+    refuse("is cut off: the file ends after " + std::to_string(file_.size()) + " bytes");
 }
 
 const std::byte* StripReader::bytes(size_t size) {
   const auto read = window_->at(at_.offset, size);
   if (read.size() < size)
-    refuse("ends past the " + std::to_string(file_.size()) + " bytes of the file");
+    refuse("is cut off: the file ends after " + std::to_string(file_.size()) + " bytes");
   at_.offset += size;
   return read.data();
 }
@@ -128,7 +128,7 @@ const std::byte* StripReader::bytes(size_t size) {
 std::string_view StripReader::word() {
   text_->begin_row(at_.offset);
   const std::string_view text = text_->word();
-  if (text.empty()) refuse("ends before its properties do, expected a value for each of them");
+  if (text.empty()) refuse("has too few values, expected one for each property");
   at_.offset = text_->offset();
   return text;
 }

@@ -38,7 +38,9 @@ std::optional<EncodedRegion> RegionRecords::next() {
   const auto prefix = in_.take(prefixes * sizeof(uint32_t));
   if (!in_.ok())
     throw Error(ErrorCode::kCorrupt,
-                "the stored colors end within a record: expected a complete last record");
+                "record " + std::to_string(count_) +
+                    " of the stored attributes is cut off: expected a complete region");
+  ++count_;
   region.blocks.assign(blocks.begin(), blocks.end());
   region.prefix.resize(prefixes);
   std::ranges::copy(prefix, std::as_writable_bytes(std::span(region.prefix)).begin());

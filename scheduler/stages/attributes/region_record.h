@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -26,6 +27,7 @@ class RegionRecords {
 
  private:
   ByteSource in_;
+  uint64_t count_ = 0;
 };
 
 }  // namespace voxdag

@@ -15,8 +15,9 @@ namespace {
 constexpr uint64_t kMaxPlanBytes = uint64_t{1} << 30;
 
 // Returns the planned subvolumes as solid parts, read from the subvolume list that the job's
-// process wrote.
-std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t resolution) {
+// process wrote to `path`.
+std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, const std::string& path,
+                                            uint64_t resolution) {
   const uint32_t levels = levels_of_resolution(resolution);
   std::vector<PartialDag::Part> parts;
   for (const auto& entry : plan.at("cubes")) {
@@ -24,8 +25,7 @@ std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, uint64_t
     const auto is_outside = [&](uint64_t at) { return at >= resolution || at % edge != 0; };
     if (!std::has_single_bit(edge) || edge < uint64_t{kBrickEdge} || edge > resolution ||
         is_outside(entry.at(0)) || is_outside(entry.at(1)) || is_outside(entry.at(2)))
-      throw Error(ErrorCode::kCorrupt, "the list of the subvolumes has the invalid cube " +
-                                           entry.dump() +
+      throw Error(ErrorCode::kCorrupt, path + ": 'cubes' has the entry " + entry.dump() +
                                            ": expected a cube of the octree, [X,Y,Z,EDGE,BUILT]");
     Cube cube{levels - levels_of_resolution(edge), {}};
     for (size_t axis = 0; axis < 3; ++axis)
@@ -67,7 +67,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
     PartialDag nodes(levels);
     // After one call of add(), the root is the only node of its level. So its offset is 0, which
     // the view of the copy expects.
-    if (nodes.add(planned_parts(plan, resolution))) {
+    if (nodes.add(planned_parts(plan, folder.subvolumes(), resolution))) {
       const PartialDagCopy planned(nodes, levels);
       const CancelToken never;
       query::NamedViews views(planned.view(), never);

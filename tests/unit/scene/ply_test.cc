@@ -370,7 +370,7 @@ TEST(Ply, HostileTextIsRefused) {
       "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
   const std::pair<std::string, const char*> cases[] = {
       {"0 0 0\n1 0 zero\n0 1 0\n3 0 1 2\n", "vertex 1 has zero, expected a number"},
-      {"0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "vertex 1 ends before its properties do"},
+      {"0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "vertex 1 has too few values on its line"},
       {"0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n", "vertex 1 has more on its line"},
       {"0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "face 0 ends before"},
       {"0 0 0\n1 0 0\n0 1 0\n3 0 1 2.5\n", "face 0 has 2.5, expected an integer"},
