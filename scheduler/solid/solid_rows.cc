@@ -11,7 +11,7 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kMagic = 0x31776f7267647876ull;
-constexpr uint64_t kHeaderBytes = 64;
+constexpr uint64_t kRowsHeaderBytes = 64;
 
 void put(ByteSink& sink, const RowExtent& extent) {
   for (const uint64_t word : {extent.offset, extent.bytes, extent.checksum}) sink.put(word);
@@ -29,7 +29,7 @@ std::vector<std::byte> header_of(const RowExtent& index) {
   sink.put(kMagic);
   put(sink, index);
   sink.put(checksum64(header));
-  header.resize(kHeaderBytes);
+  header.resize(kRowsHeaderBytes);
   return header;
 }
 
@@ -49,8 +49,8 @@ bool SolidRows::load() {
   if (!files_.exists(path_)) return false;
   try {
     const auto file = files_.open_read(path_);
-    if (file->size() < kHeaderBytes) return false;
-    std::vector<std::byte> header(kHeaderBytes);
+    if (file->size() < kRowsHeaderBytes) return false;
+    std::vector<std::byte> header(kRowsHeaderBytes);
     file->read_at(0, header);
     ByteSource source(header);
     source.get<uint64_t>();
@@ -69,8 +69,8 @@ void SolidRows::start() {
   cubes_.clear();
   full_cubes.clear();
   counts = {};
-  files_.create(path_)->write_at(0, std::vector<std::byte>(kHeaderBytes));
-  file_ = std::make_unique<RowFile>(files_, path_, kHeaderBytes);
+  files_.create(path_)->write_at(0, std::vector<std::byte>(kRowsHeaderBytes));
+  file_ = std::make_unique<RowFile>(files_, path_, kRowsHeaderBytes);
 }
 
 void SolidRows::save() {
