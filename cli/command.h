@@ -152,6 +152,7 @@ void add_combine_command(CommandLine& line);
 void add_edit_command(CommandLine& line);
 void add_export_command(CommandLine& line);
 void add_view_command(CommandLine& line);
+void add_publish_command(CommandLine& line);
 // Adds `serve`, `token`, and the hidden command that `serve` runs in a child process for each job.
 void add_serve_commands(CommandLine& line);
 void add_health_command(CommandLine& line);

@@ -51,7 +51,7 @@ int run(int argc, char** argv) {
            add_render_command,      add_extract_command,    add_combine_command,
            add_edit_command,        add_export_command,
 #ifdef VOXDAG_HAS_VIEWER
-           add_view_command,
+           add_view_command,        add_publish_command,
 #endif
 #ifdef VOXDAG_HAS_SERVER
            add_serve_commands,      add_health_command,     add_submit_command,

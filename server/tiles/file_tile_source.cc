@@ -5,7 +5,6 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
-#include "query/render/views.h"
 #include "server/tiles/manifest.h"
 
 namespace voxdag::server {
@@ -21,25 +20,6 @@ std::string digest_of(const voxdag_reader::File& file) {
   text += "tiles 1 " + std::to_string(kTileLevels);
   if (file.has_colors()) text += " colors 1";
   return sha256_hex(text).substr(0, kDigestDigits);
-}
-
-std::string describe(const voxdag_reader::File& file, const query::DagView& dag,
-                     const std::string& digest, const CancelToken& cancel) {
-  const GridPlace place{{file.origin()[0], file.origin()[1], file.origin()[2]}, file.edge()};
-  auto json =
-      manifest_of(dag, digest, place, dag.empty() ? std::nullopt : std::optional<uint64_t>(0));
-  json["voxels"] = std::to_string(file.voxels());
-  if (file.has_colors())
-    json["colors"] = {{"levels", file.color_levels()}, {"batch_max", kMaxColorPagesOfBatch}};
-  if (dag.empty()) return json.dump();
-  query::NamedViews views(dag, cancel);
-  const query::Box& box = views.box();
-  json["box"] = {{"low", box.low.v}, {"high", box.high.v}};
-  json["camera"] = camera_of("auto", views, dag, place);
-  for (const std::string& view : query::view_names())
-    if (view != "auto" && view != "inside")
-      json["views"][view] = camera_of(view, views, dag, place);
-  return json.dump();
 }
 
 }  // namespace
@@ -81,7 +61,7 @@ const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
   const auto known = manifests_ ? manifests_->find(digest_) : std::nullopt;
   // Verifies the checksum of the root's bytes before the manifest is computed from them.
   if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);
-  manifest_ = known ? *known : describe(*file_, dag_, digest_, cancel);
+  manifest_ = known ? *known : file_manifest(*file_, dag_, digest_, cancel).dump();
   expect_readable();
   if (manifests_ && !known) manifests_->keep(digest_, manifest_);
   has_manifest_ = true;

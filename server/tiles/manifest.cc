@@ -48,4 +48,23 @@ nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& vie
           {"fov_degrees", p.fov_degrees}};
 }
 
+nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const query::DagView& dag,
+                                     const std::string& digest, const CancelToken& cancel) {
+  const GridPlace place{{file.origin()[0], file.origin()[1], file.origin()[2]}, file.edge()};
+  ManifestJson json =
+      manifest_of(dag, digest, place, dag.empty() ? std::nullopt : std::optional<uint64_t>(0));
+  json["voxels"] = std::to_string(file.voxels());
+  if (file.has_colors())
+    json["colors"] = {{"levels", file.color_levels()}, {"batch_max", kMaxColorPagesOfBatch}};
+  if (dag.empty()) return json;
+  query::NamedViews views(dag, cancel);
+  const query::Box& box = views.box();
+  json["box"] = {{"low", box.low.v}, {"high", box.high.v}};
+  json["camera"] = camera_of("auto", views, dag, place);
+  for (const std::string& view : query::view_names())
+    if (view != "auto" && view != "inside")
+      json["views"][view] = camera_of(view, views, dag, place);
+  return json;
+}
+
 }  // namespace voxdag::server

@@ -6,8 +6,10 @@
 #include <optional>
 #include <string>
 
+#include "core/format/global/voxdag_reader.h"
 #include "query/dag/dag_view.h"
 #include "query/render/views.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::server {
 
@@ -26,5 +28,10 @@ nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string&
 // `views`.
 nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& views,
                                  const query::DagView& dag, const GridPlace& place);
+
+// Returns the manifest of a file. Computing the cameras may take a second, or longer if the file is
+// not in memory.
+nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const query::DagView& dag,
+                                     const std::string& digest, const CancelToken& cancel);
 
 }  // namespace voxdag::server

@@ -1,4 +1,5 @@
-// Tests `voxdag view`, which serves the page of one file on this machine until Ctrl-C.
+// Tests `voxdag view`, which serves the page of one file on this machine until Ctrl-C, and `voxdag
+// publish`.
 #include <signal.h>
 
 #include <chrono>
@@ -58,6 +59,21 @@ TEST_F(View, RefusesWhatItCannotShow) {
   expect_error(3, "none.vdag", {"view", "none.vdag"});
   expect_error(4, "text.vdag", {"view", "text.vdag"});
   expect_error(2, "--port", {"view", "m.vdag", "--port", "65536"});
+}
+
+TEST_F(View, IsPublished) {
+  const Json report = run_json({"publish", "m.vdag", "-o", "p", "--title", "A <sphere>"});
+  EXPECT_EQ(report["files"], 5);
+  const Json checked = run_json({"publish", "--check", "p"});
+  for (const char* member : {"packs", "tiles", "color_pages"})
+    EXPECT_EQ(checked[member], report[member]) << member;
+  EXPECT_NE(run({"publish", "--check", "p/"}).out.find("intact"), std::string::npos);
+  run_json({"publish", "m.vdag", "-o", "p/", "--gray", "--pack-size", "1MiB"});
+  expect_error(2, "m.vdag is a file: expected a new folder", {"publish", "m.vdag", "-o", "m.vdag"});
+  expect_error(2, "--pack-size 1KiB: expected 256KiB to 1GiB",
+               {"publish", "m.vdag", "-o", "q", "--pack-size", "1KiB"});
+  expect_error(2, "--check DIR", {"publish", "m.vdag"});
+  expect_error(3, "package.json", {"publish", "--check", "q"});
 }
 
 }  // namespace

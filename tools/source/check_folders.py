@@ -126,6 +126,7 @@ LAYERS = {
         "server/api/context",
         "server/api/access",
         "server/api/answers",
+        "server/site",
         "server/web",
         "server/tiles/partial",
         "server/tiles",
@@ -167,7 +168,7 @@ THIRD_PARTY = {
     "webp/decode.h": ["core/image"],
     "webp/encode.h": ["tests"],
     "avif/avif.h": ["core/image", "tests"],
-    "zlib.h": ["server", "tests", "bench"],
+    "zlib.h": ["query", "server", "tests", "bench"],
     "openvdb/openvdb.h": ["query", "bench", "tests"],
     "nanovdb/util/OpenToNanoVDB.h": ["query"],
 }

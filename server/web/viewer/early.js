@@ -4,12 +4,12 @@
 
 import {createContext} from "./gl/gl_objects.js";
 import {Passes} from "./gl/passes.js";
-import {TileSource} from "./tile_source.js";
+import {isPublished, sourceOfPage} from "./page_source.js";
 
 let begun = null;
 
 function begin(canvas) {
-  const source = new TileSource({base: "/api/v1/view"}), manifest = source.manifest();
+  const source = sourceOfPage(), manifest = source.manifest();
   const beginMs = performance.now(), gl = createContext(canvas);
   manifest.catch(() => {});  // the error is reported where the promise is awaited
   if (!gl) return;
@@ -27,7 +27,8 @@ function begin(canvas) {
   manifest.then(({colors}) => mine.passes?.compile(Boolean(colors))).catch(() => {});
 }
 
-if (!new URLSearchParams(location.search).has("job")) begin(document.getElementById("scene"));
+if (isPublished() || !new URLSearchParams(location.search).has("job"))
+  begin(document.getElementById("scene"));
 
 // Returns {source, manifest, beginMs, gl, passes} for the canvas of the page. `passes` is null if
 // the context was lost. Returns null after the first call, or if no context is available.

@@ -8,6 +8,7 @@ import {problemBox} from "../views/parts.js";
 
 import {Viewer} from "./app.js";
 import {takeBegun} from "./early.js";
+import {isPublished, sourceOfPage} from "./page_source.js";
 import {Renderer, WebGLUnavailable} from "./render/renderer.js";
 import {TileSource} from "./tile_source.js";
 import {fillTools} from "./tools.js";
@@ -19,7 +20,7 @@ const kPauseMs = 3000, kMaxPauseMs = 15000;
 
 const place = (id) => document.getElementById(id);
 const parameters = new URLSearchParams(location.search);
-const askedJob = parameters.get("job");
+const askedJob = isPublished() ? null : parameters.get("job");
 const jobId = /^[0-9a-f]{1,32}$/.exec(askedJob ?? "")?.[0] ?? null;
 const lifetime = new AbortController();
 
@@ -162,10 +163,9 @@ async function start() {
         404, "not_found", "no such job: its id in the address of this page is malformed"));
   const job = jobId ? await finishedJob() : null;
   const begun = takeBegun();
-  const source =
-      begun?.source ??
-      new TileSource(
-          {base: jobId ? `/api/v1/jobs/${jobId}` : "/api/v1/view", headers: authorization()});
+  const source = begun?.source ??
+      (jobId ? new TileSource({base: `/api/v1/jobs/${jobId}`, headers: authorization()}) :
+               sourceOfPage(authorization()));
   const canvas = place("scene"), ended = new AbortController();
   let viewer = null;
   let renderer = null;
@@ -259,7 +259,7 @@ async function signIn() {
 function run() {
   hideMessage();
   start().catch((error) => {
-    if (error.status !== 401) showFailure(error);
+    if (error.status !== 401 || isPublished()) showFailure(error);
     else if (!(error instanceof Problem)) signIn();  // a Problem has already shown the login page
   });
 }

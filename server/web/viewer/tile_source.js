@@ -201,7 +201,7 @@ function problemOf({status, headers}, bytes) {
 }
 
 // Checks those values of the manifest on which GPU memory sizes and loop bounds depend.
-function checkManifest(info) {
+export function checkManifest(info) {
   const expect = (isTrue, name) => {
     if (!isTrue)
       throw new TileError(

@@ -30,7 +30,9 @@ export function pauseAfter(failures) {
 
 // Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. Derived classes have
 // these functions:
-//     async fetchAll(batch, options) resolves to the answers, in the order of the requests
+//     async fetchAll(batch, options) resolves to the answers, in the order of the requests. An
+//     answer
+//         may be an Error, if only this item is not available
 //     keep(request, answer, nowMs)   false if there is no space; throws if the answer is damaged
 //     nameOf(request)                the item's name for messages
 // and `store.rounds`, the number of readings since the view changed.
@@ -183,6 +185,7 @@ export class Loader {
     batch.forEach((request, i) => {
       if (!hasRoom) return;
       try {
+        if (answer[i] instanceof Error) throw answer[i];
         if (this.keep(request, answer[i], nowMs)) {
           this.failures.delete(request.key);
         } else {
@@ -250,7 +253,7 @@ export class Loader {
     else
       this.refusal = isAnswer && !error.isMissing && error.code !== "corrupt" ?
           this.refusal ?? kRefused :
-          kDamaged;
+          this.source.damage ?? kDamaged;
     if (this.warnings++ < kMaxWarnings)
       console.warn(`voxdag: ${this.nameOf(request)} is unusable${
           count < kMaxTries ? " and is requested again" : ""}: ${error.message}`);

@@ -63,6 +63,7 @@ export class TileLoader extends Loader {
         [words] = await this.source.fetchTiles(
             [{level, offset}], {signal, cache: tries > 1 ? "reload" : undefined});
         if (this.disposed) return;
+        if (words instanceof Error) throw words;
         if (!this.store.add(level, offset, words, performance.now())) words = null;
       } catch (error) {
         if (error.isMissing && !this.disposed) await this.source.lookAgain(signal);

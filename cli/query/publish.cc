@@ -1,0 +1,137 @@
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "cli/output.h"
+#include "cli/run_times.h"
+#include "cli/selection_options.h"
+#include "cli/terminal/progress_bar.h"
+#include "core/base/process_limits.h"
+#include "core/base/text.h"
+#include "core/base/text/printable.h"
+#include "core/format/global/open_global.h"
+#include "query/package/package_reader.h"
+#include "query/package/write_package.h"
+#include "server/site/viewer_site.h"
+#include "server/tiles/manifest.h"
+
+namespace voxdag::cli {
+namespace {
+
+constexpr uint64_t kMinPackBytes = query::kFirstPackBytes, kMaxPackBytes = uint64_t{1} << 30;
+
+struct PublishCommand {
+  std::string input, output, check, title, memory, pack_size;
+  bool gray = false, quiet = false, json = false;
+  unsigned threads = default_threads();
+};
+
+// The default is the name of the file without folder and ending.
+std::string title_of(const PublishCommand& command) {
+  if (!command.title.empty()) return command.title;
+  const std::string name = command.input.substr(command.input.rfind('/') + 1);
+  return name.substr(0, name.rfind('.'));
+}
+
+uint64_t pack_bytes_of(const std::string& text) {
+  const uint64_t bytes = parse_size(text, "--pack-size");
+  if (bytes < kMinPackBytes || bytes > kMaxPackBytes)
+    throw Error(ErrorCode::kInvalidInput, "--pack-size " + text + ": expected 256KiB to 1GiB");
+  return bytes;
+}
+
+std::string manifest_of(const PublishCommand& command, const voxdag_reader::File& file,
+                        const CancelToken& cancel) {
+  auto manifest = server::file_manifest(file, query::DagView(file), "", cancel);
+  manifest["tile_levels"] = query::kPackageTileLevels;
+  manifest["name"] = title_of(command);
+  return manifest.dump();
+}
+
+void print(const PublishCommand& command, const query::PackageReport& r, const RunTimes& times) {
+  std::printf("%s: %s in %s files\n", printable_line(command.output).c_str(),
+              size_text(r.bytes).c_str(), count_text(r.files).c_str());
+  std::printf("  %s tiles and %s color pages in %s blocks\n", count_text(r.tiles).c_str(),
+              count_text(r.color_pages).c_str(), count_text(r.blocks).c_str());
+  std::printf("  %s wall, %s CPU, peak memory %s\n", duration_text(times.wall_s).c_str(),
+              duration_text(times.cpu_s).c_str(), size_text(peak_resident_bytes()).c_str());
+}
+
+nlohmann::ordered_json report_json(const PublishCommand& command, const query::PackageReport& r,
+                                   const RunTimes& times) {
+  return {{"output", command.output},
+          {"digest", r.digest},
+          {"bytes", r.bytes},
+          {"files", r.files},
+          {"packs", r.packs},
+          {"blocks", r.blocks},
+          {"tiles", r.tiles},
+          {"color_pages", r.color_pages},
+          {"wall_s", times.wall_s},
+          {"cpu_s", times.cpu_s},
+          {"peak_rss_bytes", peak_resident_bytes()}};
+}
+
+void check(const PublishCommand& command, CommandContext& context) {
+  const auto progress = make_progress_bar(command.quiet);
+  const query::PackageReader reader(context.files, command.check);
+  reader.check(*progress, context.cancel);
+  uint64_t tiles = 0, color_pages = 0;
+  for (const query::PackageBand& band : reader.index().bands)
+    (band.is_color ? color_pages : tiles) += band.items;
+  const size_t packs = reader.index().packs.size();
+  if (command.json)
+    print_json(nlohmann::ordered_json{{"package", command.check},
+                                      {"packs", packs},
+                                      {"tiles", tiles},
+                                      {"color_pages", color_pages}});
+  else
+    std::printf("%s: intact, %s tiles and %s color pages in %s packs\n",
+                printable_line(command.check).c_str(), count_text(tiles).c_str(),
+                count_text(color_pages).c_str(), count_text(packs).c_str());
+}
+
+void run(const PublishCommand& command, CommandContext& context) {
+  if (!command.check.empty()) return check(command, context);
+  if (command.input.empty() || command.output.empty())
+    throw Error(ErrorCode::kInvalidInput, "expected a .vdag file and --output DIR, or --check DIR");
+  query::PackageSpec spec;
+  spec.output = command.output;
+  spec.colors = !command.gray;
+  spec.pack_bytes = pack_bytes_of(command.pack_size.empty() ? "8MiB" : command.pack_size);
+  spec.memory_bytes = memory_limit(command.memory);
+  spec.threads = command.threads;
+  const auto file = open_global_file(command.input);
+  spec.manifest = manifest_of(command, *file, context.cancel);
+  const auto progress = make_progress_bar(command.quiet);
+  const RunTimer timer;
+  const query::PackageReport report =
+      query::write_package(*file, spec, server::viewer_site(title_of(command)), context.files,
+                           *progress, context.cancel);
+  const RunTimes times = timer.elapsed();
+  if (!command.json) return print(command, report, times);
+  print_json(report_json(command, report, times));
+}
+
+void declare(Command& command, PublishCommand& state) {
+  command.option("input", state.input, "the .vdag file");
+  command.output_option("-o,--output", state.output, "the folder to write, for a web server");
+  command.option("--check", state.check, "check all files of a folder that this command wrote");
+  command.option("--title", state.title, "title of the page (default: the name of the file)");
+  command.flag("--gray", state.gray, "leave out the colors");
+  command.option("--pack-size", state.pack_size,
+                 "size of the files with tiles, such as 8MiB, the default");
+  command.option("--memory", state.memory,
+                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.threads_option(state.threads);
+  command.quiet_flag(state.quiet);
+  command.json_flag(state.json);
+}
+
+}  // namespace
+
+void add_publish_command(CommandLine& line) {
+  add_command<PublishCommand>(line, "publish", "write a DAG and its viewer for any web server");
+}
+
+}  // namespace voxdag::cli

@@ -1,0 +1,126 @@
+#include "query/package/package_folder.h"
+
+#include <set>
+
+#include "core/base/error.h"
+#include "core/io/overwrite.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
+constexpr const char* kWorkSuffix = ".work-";
+
+// Removes slashes at the end, which would make names of temporary files point into the folder.
+std::string without_slash(std::string path) {
+  while (path.size() > 1 && path.ends_with('/')) path.pop_back();
+  if (path.empty() || path == "/" || path == "." || path == "..")
+    throw Error(ErrorCode::kInvalidInput,
+                "the output '" + path + "': expected the name of a folder to write");
+  return path;
+}
+
+bool is_folder(FileSystem& files, const std::string& path) {
+  const std::string name = path.substr(path.rfind('/') + 1);
+  for (const DirectoryEntry& entry : files.list(parent_directory(path)))
+    if (entry.name == name) return entry.is_directory;
+  return false;
+}
+
+PackageIndex index_of_folder(FileSystem& files, const std::string& folder) {
+  const std::string path = folder + "/" + kIndexName;
+  return parse_index(read_small_file(files, path, kMaxIndexBytes), path);
+}
+
+// Returns the names of the files that a package has besides package.json and index.html.
+std::set<std::string> hashed_files(const PackageIndex& index) {
+  std::set<std::string> names = {index.directory.name};
+  for (const PackageFile& pack : index.packs) names.insert(pack.name);
+  for (const PackageFile& file : index.viewer) names.insert(file.name);
+  return names;
+}
+
+void refuse_other_folder(FileSystem& files, const std::string& path) {
+  const std::string parent = parent_directory(path);
+  if (!files.exists(parent))
+    throw Error(ErrorCode::kNotFound,
+                path + ": the folder " + parent + " does not exist: expected an existing folder");
+  if (!files.exists(path)) return;
+  const std::string advice = ": expected a new folder, an empty one or an earlier package";
+  if (!is_folder(files, path)) throw Error(ErrorCode::kInvalidInput, path + " is a file" + advice);
+  if (files.list(path).empty()) return;
+  try {
+    index_of_folder(files, path);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound && !error.is_corruption()) throw;
+    throw Error(ErrorCode::kInvalidInput, path + " has other files" + advice);
+  }
+}
+
+// True if a killed process left its lock file.
+bool has_left_lock(FileSystem& files, const std::string& path) {
+  refuse_other_folder(files, path);
+  const auto lock = open_if_there(files, OutputLock::path_of(path));
+  return lock && lock->size() == 0;
+}
+
+void remove_left_folders(FileSystem& files, const std::string& path) {
+  constexpr size_t kRandomCharacters = 6;  // of make_temporary_folder()
+  const std::string prefix = path.substr(path.rfind('/') + 1) + kWorkSuffix;
+  const std::string parent = parent_directory(path);
+  for (const DirectoryEntry& entry : files.list(parent))
+    if (entry.is_directory && entry.name.starts_with(prefix) &&
+        entry.name.size() == prefix.size() + kRandomCharacters)
+      remove_tree(files, parent + "/" + entry.name);
+}
+
+const std::string& after_cleaning(FileSystem& files, const std::string& path, bool is_left) {
+  if (is_left) remove_left_folders(files, path);
+  return path;
+}
+
+}  // namespace
+
+PackageFolder::PackageFolder(FileSystem& files, const std::string& path)
+    : files_(files),
+      path_(without_slash(path)),
+      is_left_behind_(has_left_lock(files, path_)),
+      lock_(files, path_),
+      work_(files, after_cleaning(files, path_, is_left_behind_) + kWorkSuffix) {
+  files_.make_directories(new_files());
+}
+
+void PackageFolder::publish(const PackageIndex& index) {
+  files_.sync_directory(new_files());
+  refuse_other_folder(files_, path_);  // another program may have created it
+  if (files_.exists(path_) && !files_.list(path_).empty()) {
+    update(index);
+  } else {
+    if (files_.exists(path_)) files_.remove_directory(path_);
+    if (!files_.rename_new(new_files(), path_))
+      throw Error(ErrorCode::kInvalidInput,
+                  path_ + " was created by another program: expected a new folder");
+  }
+  files_.sync_directory(parent_directory(path_));
+}
+
+// The names of most files contain the hash of their contents, so files of the old and of the new
+// package do not replace each other. package.json decides which files a viewer reads.
+void PackageFolder::update(const PackageIndex& index) {
+  const std::set<std::string> old_files = hashed_files(index_of_folder(files_, path_)),
+                              new_files = hashed_files(index);
+  const auto move = [&](const std::string& name) {
+    files_.rename(this->new_files() + "/" + name, path_ + "/" + name);
+  };
+  files_.make_directories(path_ + "/packs");
+  for (const std::string& name : new_files) move(name);
+  files_.sync_directory(path_ + "/packs");
+  for (const char* name : {"index.html", kIndexName})
+    if (files_.exists(this->new_files() + "/" + name)) move(name);
+  files_.sync_directory(path_);
+  for (const std::string& name : old_files)
+    if (!new_files.contains(name) && files_.exists(path_ + "/" + name))
+      files_.remove(path_ + "/" + name);
+}
+
+}  // namespace voxdag::query

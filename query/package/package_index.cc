@@ -1,0 +1,161 @@
+#include "query/package/package_index.h"
+
+#include <array>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "core/base/error.h"
+#include "core/format/checksum.h"
+#include "core/geometry/cube.h"
+
+namespace voxdag::query {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormat = "voxdag package";
+constexpr int kVersion = 1;
+constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // JavaScript has exact integers up to it
+
+Json file_json(const PackageFile& file, bool is_pack) {
+  Json json = {{"name", file.name}, {"bytes", file.bytes}};
+  if (is_pack) json["blocks"] = file.blocks;
+  return json;
+}
+
+// Names of files come from a file that anyone may have written. A name must not lead out of the
+// package's folder.
+bool is_safe_name(const std::string& name) {
+  if (name.empty() || name[0] == '/' || name[0] == '.') return false;
+  if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-./") != name.npos) return false;
+  return name.find("..") == name.npos && name.find("//") == name.npos;
+}
+
+class Parser {
+ public:
+  explicit Parser(const std::string& path) : path_(path) {}
+
+  PackageIndex parse(std::string_view text) const {
+    const Json json = Json::parse(text, nullptr, false);
+    expect(json.is_object() && json.value("format", Json()) == kFormat, "'format'",
+           std::string("'") + kFormat + "'");
+    if (json.value("version", Json()) != kVersion)
+      throw Error(ErrorCode::kUnsupportedVersion,
+                  path_ + ": expected version " + std::to_string(kVersion) + " of the package");
+    PackageIndex index;
+    const Json& manifest = member(json, "manifest");
+    expect(manifest.is_object(), "'manifest'", "an object");
+    index.manifest = manifest.dump();
+    for (const Json& band : list(json, "bands")) index.bands.push_back(band_of(band));
+    const Json& directory = member(json, "directory");
+    index.directory = file_of(directory);
+    for (const Json& page : list(directory, "pages"))
+      index.pages.push_back({.bytes = number(page, "bytes"),
+                             .pack = number(page, "pack"),
+                             .offset = number(page, "offset"),
+                             .code = number(page, "code")});
+    for (const Json& pack : list(json, "packs")) {
+      index.packs.push_back(file_of(pack));
+      index.packs.back().blocks = number(pack, "blocks");
+    }
+    for (const Json& file : list(json, "viewer")) index.viewer.push_back(file_of(file));
+    check_sums(index);
+    return index;
+  }
+
+ private:
+  void expect(bool is_true, const std::string& what, const std::string& expected) const {
+    if (!is_true) throw Error(ErrorCode::kCorrupt, path_ + ": " + what + ": expected " + expected);
+  }
+  const Json& member(const Json& json, const char* name) const {
+    expect(json.is_object() && json.contains(name), std::string("'") + name + "'", "a value");
+    return json[name];
+  }
+  const Json& list(const Json& json, const char* name) const {
+    const Json& value = member(json, name);
+    expect(value.is_array(), std::string("'") + name + "'", "a list");
+    return value;
+  }
+  uint64_t number(const Json& json, const char* name) const {
+    const Json& value = member(json, name);
+    expect(value.is_number_unsigned() && value.get<uint64_t>() <= kMaxNumber,
+           std::string("'") + name + "'", "a whole number up to 2^53");
+    return value.get<uint64_t>();
+  }
+  PackageFile file_of(const Json& json) const {
+    const Json& name = member(json, "name");
+    expect(name.is_string() && is_safe_name(name.get<std::string>()), "'name'",
+           "the name of a file in the package");
+    return {name.get<std::string>(), number(json, "bytes"), 0};
+  }
+  PackageBand band_of(const Json& json) const {
+    expect(json.is_object(), "'bands'", "a list of objects");
+    PackageBand band;
+    band.is_color = json.contains("pages");
+    const uint64_t level = number(json, "level");
+    expect(level <= uint64_t{kMaxGridLevels}, "'level'", "a level of the grid");
+    band.level = static_cast<uint32_t>(level);
+    band.items = number(json, band.is_color ? "pages" : "tiles");
+    band.blocks = number(json, "blocks");
+    expect(band.is_color ? band.blocks <= band.items
+                         : band.blocks == (band.items + kBlockTiles - 1) / kBlockTiles,
+           "'blocks'", "the number of blocks of a band");
+    return band;
+  }
+  void check_sums(const PackageIndex& index) const {
+    uint64_t of_bands = 0, of_packs = 0, of_pages = 0;
+    for (const PackageBand& band : index.bands) of_bands += band.blocks;
+    for (const PackageFile& pack : index.packs) of_packs += pack.blocks;
+    for (const DirectoryPage& page : index.pages) {
+      of_pages += page.bytes;
+      expect(page.pack < index.packs.size(), "'pack'", "the number of a pack");
+    }
+    expect(of_bands == of_packs, "'blocks'", "the same sum for bands and for packs");
+    expect(of_pages == index.directory.bytes, "'pages'", "the sizes of the directory's pages");
+    expect(index.pages.size() == (of_bands + kPageBlocks - 1) / kPageBlocks, "'pages'",
+           "a page for " + std::to_string(kPageBlocks) + " blocks");
+  }
+
+  const std::string& path_;
+};
+
+}  // namespace
+
+std::string index_text(const PackageIndex& index) {
+  Json bands = Json::array(), pages = Json::array(), packs = Json::array(), viewer = Json::array();
+  for (const PackageBand& band : index.bands)
+    bands.push_back({{"level", band.level},
+                     {band.is_color ? "pages" : "tiles", band.items},
+                     {"blocks", band.blocks}});
+  for (const DirectoryPage& page : index.pages)
+    pages.push_back(
+        {{"bytes", page.bytes}, {"pack", page.pack}, {"offset", page.offset}, {"code", page.code}});
+  for (const PackageFile& pack : index.packs) packs.push_back(file_json(pack, true));
+  for (const PackageFile& file : index.viewer) viewer.push_back(file_json(file, false));
+  Json directory = file_json(index.directory, false);
+  directory["pages"] = std::move(pages);
+  const Json json = {{"format", kFormat},
+                     {"version", kVersion},
+                     {"manifest", Json::parse(index.manifest)},
+                     {"bands", std::move(bands)},
+                     {"directory", std::move(directory)},
+                     {"packs", std::move(packs)},
+                     {"viewer", std::move(viewer)}};
+  return json.dump() + "\n";
+}
+
+PackageIndex parse_index(std::string_view text, const std::string& path) {
+  return Parser(path).parse(text);
+}
+
+std::string hashed_name(const std::string& stem, std::string_view contents,
+                        const std::string& suffix) {
+  std::array<char, 17> digits;
+  std::snprintf(digits.data(), digits.size(), "%016llx",
+                static_cast<unsigned long long>(
+                    checksum64(std::as_bytes(std::span(contents.data(), contents.size())))));
+  return stem + "-" + digits.data() + suffix;
+}
+
+}  // namespace voxdag::query

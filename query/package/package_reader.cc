@@ -1,0 +1,248 @@
+#include "query/package/package_reader.h"
+
+#include <algorithm>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "core/format/checksum.h"
+#include "core/format/global/open_global.h"
+#include "core/geometry/cube.h"
+#include "core/geometry/morton.h"
+#include "query/package/color_block.h"
+#include "query/package/gzip_block.h"
+#include "query/package/tile_block.h"
+#include "query/tiles/tile.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
+constexpr size_t kMaxBlockBytes = size_t{1} << 20;  // not compressed
+constexpr size_t kDirectoryEntryBytes = 2, kCodeBytes = 8;
+constexpr size_t kHashDigits = 16;
+
+[[noreturn]] void corrupt(const std::string& path, const std::string& what) {
+  throw Error(ErrorCode::kCorrupt, path + ": " + what);
+}
+
+template <class T>
+T number_at(std::string_view bytes, size_t at) {
+  T number;
+  std::memcpy(&number, bytes.data() + at, sizeof number);
+  return number;
+}
+
+}  // namespace
+
+PackageReader::PackageReader(FileSystem& files, const std::string& folder)
+    : files_(files), folder_(folder) {
+  const std::string path = path_of(kIndexName);
+  index_ = parse_index(read_small_file(files_, path, kMaxFileBytes), path);
+  const auto manifest = nlohmann::json::parse(index_.manifest);
+  const auto levels = manifest.value("levels", nlohmann::json());
+  if (!levels.is_number_unsigned() || levels.get<uint64_t>() < kBrickLevels ||
+      levels.get<uint64_t>() > uint64_t{kMaxGridLevels})
+    corrupt(path, "'levels' of the manifest: expected the levels of a grid");
+  if (manifest.value("tile_levels", 0) != static_cast<int>(kPackageTileLevels))
+    corrupt(path, "'tile_levels' of the manifest: expected " + std::to_string(kPackageTileLevels));
+  grid_levels_ = levels.get<uint32_t>();
+  for (const PackageBand& band : index_.bands)
+    if (band.is_color ? band.level > grid_levels_ : band.level + kBrickLevels >= grid_levels_)
+      corrupt(path, "'bands': expected levels of the grid");
+  read_directory();
+}
+
+void PackageReader::read_directory() {
+  const std::string path = path_of(index_.directory.name);
+  const std::string bytes = read_small_file(files_, path, kMaxFileBytes);
+  if (bytes.size() != index_.directory.bytes)
+    corrupt(path, "it has " + std::to_string(bytes.size()) + " bytes: expected " +
+                      std::to_string(index_.directory.bytes));
+  naming_file(path, [&] { place_blocks(bytes); });
+}
+
+uint64_t PackageReader::count_color_blocks(uint64_t first, uint64_t count) const {
+  uint64_t colored = 0, begin = 0;
+  for (const PackageBand& band : index_.bands) {
+    const uint64_t end = begin + band.blocks, low = std::max(begin, first),
+                   high = std::min(end, first + count);
+    if (band.is_color && low < high) colored += high - low;
+    begin = end;
+  }
+  return colored;
+}
+
+void PackageReader::place_blocks(const std::string& directory) {
+  uint64_t blocks = 0, at = 0;
+  for (const PackageBand& band : index_.bands) blocks += band.blocks;
+  uint64_t pack = 0, offset = 0, in_pack = 0;
+  std::vector<bool> is_color;
+  for (const PackageBand& band : index_.bands)
+    is_color.insert(is_color.end(), band.blocks, band.is_color);
+  for (const DirectoryPage& page : index_.pages) {
+    const uint64_t first = places_.size(), count = std::min(kPageBlocks, blocks - first),
+                   colored = count_color_blocks(first, count);
+    const std::string plain =
+        gunzip_block(std::string_view(directory).substr(at, page.bytes), kMaxBlockBytes);
+    at += page.bytes;
+    if (plain.size() != kDirectoryEntryBytes * count + kCodeBytes * colored)
+      throw Error(ErrorCode::kCorrupt, "a page has too few or too many entries");
+    size_t low = kDirectoryEntryBytes * count, high = low + 4 * colored;
+    for (uint64_t i = 0; i < count; ++i, ++in_pack) {
+      if (in_pack == index_.packs[pack].blocks) {
+        ++pack;
+        offset = in_pack = 0;
+      }
+      Place place{pack, offset, number_at<uint16_t>(plain, kDirectoryEntryBytes * i), 0};
+      if (is_color[first + i]) {
+        place.code = number_at<uint32_t>(plain, low) | uint64_t{number_at<uint32_t>(plain, high)}
+                                                           << 32;
+        low += 4;
+        high += 4;
+      }
+      offset += place.bytes;
+      if (offset > index_.packs[pack].bytes)
+        throw Error(ErrorCode::kCorrupt, "the blocks exceed their pack");
+      places_.push_back(place);
+    }
+    const Place& begin = places_[first];
+    if (begin.pack != page.pack || begin.offset != page.offset || begin.code != page.code)
+      throw Error(ErrorCode::kCorrupt, "a page begins at another block than its index says");
+  }
+}
+
+PackageReader::PlacedBand PackageReader::find_band(bool is_color, uint32_t level) const {
+  uint64_t first = 0;
+  for (const PackageBand& band : index_.bands) {
+    if (band.is_color == is_color && band.level == level) return {band, first};
+    first += band.blocks;
+  }
+  throw Error(ErrorCode::kNotFound, folder_ + ": level " + std::to_string(level) + ": expected a " +
+                                        (is_color ? "level with colors" : "level with tiles"));
+}
+
+std::string PackageReader::name_of(uint64_t block) const {
+  return path_of(index_.packs[places_[block].pack].name) + ": block " + std::to_string(block);
+}
+
+std::string PackageReader::block(uint64_t block) const {
+  const Place& place = places_[block];
+  const auto file = files_.open_read(path_of(index_.packs[place.pack].name));
+  std::string bytes(place.bytes, '\0');
+  file->read_at(place.offset, std::as_writable_bytes(std::span(bytes.data(), bytes.size())));
+  return naming_file(name_of(block), [&] { return gunzip_block(bytes, kMaxBlockBytes); });
+}
+
+std::vector<uint32_t> PackageReader::tile(uint32_t level, uint64_t number) const {
+  const PlacedBand band = find_band(false, level);
+  if (number >= band.band.items)
+    throw Error(ErrorCode::kNotFound, folder_ + ": tile " + std::to_string(number) + " of level " +
+                                          std::to_string(level) + ": expected a number below " +
+                                          std::to_string(band.band.items));
+  const uint64_t at = band.first + number / kBlockTiles,
+                 count = std::min<uint64_t>(kBlockTiles,
+                                            band.band.items - number / kBlockTiles * kBlockTiles);
+  const std::string bytes = block(at);
+  return naming_file(name_of(at), [&] {
+    return decode_tile_block(bytes, grid_levels_, level, static_cast<uint32_t>(count))
+        .tiles[number % kBlockTiles];
+  });
+}
+
+std::vector<uint32_t> PackageReader::color_page(uint32_t level,
+                                                const std::array<uint64_t, 3>& position) const {
+  const PlacedBand band = find_band(true, level);
+  const uint64_t code =
+      morton_encode(static_cast<uint32_t>(position[0]), static_cast<uint32_t>(position[1]),
+                    static_cast<uint32_t>(position[2]));
+  uint64_t at = band.first;
+  while (at + 1 < band.first + band.band.blocks && places_[at + 1].code <= code) ++at;
+  if (band.band.blocks == 0) return {0};
+  const std::string bytes = block(at);
+  for (CodedPage& page : naming_file(name_of(at), [&] { return decode_color_block(bytes); }))
+    if (page.code == code) return std::move(page.words);
+  return {0};
+}
+
+void PackageReader::check_file(const PackageFile& file) const {
+  const std::string path = path_of(file.name);
+  const std::string contents = read_small_file(files_, path, kMaxFileBytes);
+  if (contents.size() != file.bytes)
+    corrupt(path, "it has " + std::to_string(contents.size()) + " bytes: expected " +
+                      std::to_string(file.bytes));
+  const std::string hash = hashed_name("", contents, ".").substr(0, kHashDigits + 2);
+  if (file.name.find(hash) == std::string::npos)
+    corrupt(path, "its contents have the hash " + hash.substr(1, kHashDigits) +
+                      ": expected the hash in its name");
+}
+
+uint64_t PackageReader::check_tiles(const PlacedBand& band, Progress& progress,
+                                    const CancelToken& cancel) const {
+  uint32_t next = 0;
+  for (uint64_t i = 0; i < band.band.blocks; ++i) {
+    cancel.check();
+    const std::string bytes = block(band.first + i);
+    naming_file(name_of(band.first + i), [&] {
+      const uint64_t count = std::min<uint64_t>(kBlockTiles, band.band.items - i * kBlockTiles);
+      const TileBlock tiles =
+          decode_tile_block(bytes, grid_levels_, band.band.level, static_cast<uint32_t>(count));
+      if (tiles.first != next)
+        throw Error(ErrorCode::kCorrupt, "its first new number is " + std::to_string(tiles.first) +
+                                             ": expected " + std::to_string(next));
+      next = tiles.next;
+    });
+    progress.advance(1);
+  }
+  return next;
+}
+
+void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
+                                 const CancelToken& cancel) const {
+  uint64_t count = 0, last = 0;
+  for (uint64_t at = band.first; at < band.first + band.band.blocks; ++at) {
+    cancel.check();
+    const std::string bytes = block(at);
+    naming_file(name_of(at), [&] {
+      const std::vector<CodedPage> pages = decode_color_block(bytes);
+      if (pages[0].code != places_[at].code || (count > 0 && pages[0].code <= last))
+        throw Error(ErrorCode::kCorrupt, "its first page is not the page of the directory");
+      last = pages.back().code;
+      count += pages.size();
+    });
+    progress.advance(1);
+  }
+  if (count != band.band.items)
+    corrupt(path_of(kIndexName), "level " + std::to_string(band.band.level) + " has " +
+                                     std::to_string(count) + " color pages: expected " +
+                                     std::to_string(band.band.items));
+}
+
+void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
+  progress.begin_stage("check", places_.size(), "blocks");
+  check_file(index_.directory);
+  for (const PackageFile& file : index_.viewer) check_file(file);
+  for (const PackageFile& pack : index_.packs) {
+    cancel.check();
+    check_file(pack);
+  }
+  uint64_t first = 0, expected = 1;
+  for (const PackageBand& band : index_.bands) {
+    if (band.is_color) {
+      check_colors({band, first}, progress, cancel);
+    } else {
+      if (band.items != expected)
+        corrupt(path_of(kIndexName), "level " + std::to_string(band.level) + " has " +
+                                         std::to_string(band.items) + " tiles: expected " +
+                                         std::to_string(expected) +
+                                         ", the number of references to them");
+      expected = check_tiles({band, first}, progress, cancel);
+    }
+    first += band.blocks;
+  }
+  progress.end_stage();
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,69 @@
+// Reads and checks a package (package_index.h). Anyone may have written or damaged its files, so
+// all sizes are checked. Not thread-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/progress.h"
+#include "core/io/file_system.h"
+#include "query/package/package_index.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+class PackageReader {
+ public:
+  // Reads the index and the directory. Throws Error{kNotFound} without an index, Error{kCorrupt},
+  // or Error{kUnsupportedVersion}.
+  PackageReader(FileSystem& files, const std::string& folder);
+
+  const PackageIndex& index() const { return index_; }
+  // Number of levels of the grid.
+  uint32_t grid_levels() const { return grid_levels_; }
+  // Returns the words of the tile with this number in the band of `level`. The address of a cut-off
+  // node has a number instead of a word offset. Throws Error{kNotFound} if there is no such tile,
+  // Error{kCorrupt} if its block is damaged.
+  std::vector<uint32_t> tile(uint32_t level, uint64_t number) const;
+  // Returns the words of a color page (color_page.h); {0} if none of the page's cells is set.
+  std::vector<uint32_t> color_page(uint32_t level, const std::array<uint64_t, 3>& position) const;
+
+  // Checks all files: their sizes and hashes, every block, and that each tile is referred to.
+  // Throws the Error of the first problem.
+  void check(Progress& progress, const CancelToken& cancel) const;
+
+ private:
+  // The place of a block.
+  struct Place {
+    uint64_t pack = 0;
+    uint64_t offset = 0;
+    uint64_t bytes = 0;
+    uint64_t code = 0;
+  };
+  // A band, and the number of its first block.
+  struct PlacedBand {
+    PackageBand band;
+    uint64_t first = 0;
+  };
+
+  void read_directory();
+  void place_blocks(const std::string& directory);
+  uint64_t count_color_blocks(uint64_t first, uint64_t count) const;
+  PlacedBand find_band(bool is_color, uint32_t level) const;
+  std::string block(uint64_t block) const;
+  std::string path_of(const std::string& name) const { return folder_ + "/" + name; }
+  std::string name_of(uint64_t block) const;
+  void check_file(const PackageFile& file) const;
+  uint64_t check_tiles(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;
+  void check_colors(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;
+
+  FileSystem& files_;
+  const std::string folder_;
+  PackageIndex index_;
+  uint32_t grid_levels_ = 0;
+  std::vector<Place> places_;  // by block
+};
+
+}  // namespace voxdag::query

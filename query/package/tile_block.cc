@@ -1,0 +1,253 @@
+#include "query/package/tile_block.h"
+
+#include <bit>
+#include <cstring>
+
+#include "core/base/error.h"
+#include "core/dag/brick.h"
+#include "query/tiles/tile.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr size_t kTileHeadWords = 4;
+
+[[noreturn]] void refuse_block(const std::string& what) {
+  throw Error(ErrorCode::kCorrupt, "a block of tiles is damaged: " + what);
+}
+
+void set_bit(std::string& bits, size_t index) {
+  bits.resize(std::max(bits.size(), index / 8 + 1), '\0');
+  bits[index / 8] = static_cast<char>(bits[index / 8] | 1 << index % 8);
+}
+
+// Reads the columns of a block.
+class Columns {
+ public:
+  explicit Columns(std::string_view bytes) : left_(bytes) {}
+
+  std::string_view take(size_t count) {
+    if (count > left_.size()) refuse_block("expected more bytes");
+    const std::string_view column = left_.substr(0, count);
+    left_.remove_prefix(count);
+    return column;
+  }
+  // Reads `count` numbers of `bytes` bytes. The column of the lowest bytes comes first.
+  std::vector<uint64_t> take_numbers(size_t bytes, size_t count) {
+    std::vector<uint64_t> numbers(count);
+    for (size_t byte = 0; byte < bytes; ++byte) {
+      const std::string_view column = take(count);
+      for (size_t i = 0; i < count; ++i)
+        numbers[i] |= uint64_t{static_cast<unsigned char>(column[i])} << 8 * byte;
+    }
+    return numbers;
+  }
+  void expect_end() const {
+    if (!left_.empty()) refuse_block("expected no bytes after the last column");
+  }
+
+ private:
+  std::string_view left_;
+};
+
+// The content of a leaf: a brick, or the number and the coarse brick of a cut-off node.
+struct Leaf {
+  uint64_t mask = 0;
+  uint32_t number = 0;
+  bool operator==(const Leaf&) const = default;
+};
+
+// A node of an expanded tile: its child mask, and the indexes of its children among the distinct
+// nodes or leaves of the next level.
+struct ExpandedNode {
+  uint32_t mask = 0;
+  std::vector<uint32_t> children;
+  bool operator==(const ExpandedNode&) const = default;
+};
+
+// Returns the index of the item. Adds an item that is new.
+template <class Item>
+uint32_t index_in(std::vector<Item>& items, const Item& item) {
+  for (size_t i = 0; i < items.size(); ++i)
+    if (items[i] == item) return static_cast<uint32_t>(i);
+  items.push_back(item);
+  return static_cast<uint32_t>(items.size() - 1);
+}
+
+// Makes the words of a tile from its expanded form: the child masks of each level, and the leaves,
+// without sharing. In a canonical DAG, nodes are equal exactly if their contents are equal.
+class TileBuilder {
+ public:
+  TileBuilder(uint32_t level, uint32_t levels, bool bricks)
+      : level_(level), levels_(levels), bricks_(bricks) {}
+
+  std::vector<uint32_t> build(const std::vector<std::string>& masks,
+                              const std::vector<Leaf>& leaves) const {
+    std::vector<Leaf> distinct_leaves;
+    std::vector<uint32_t> children;  // of the level above, expanded
+    for (const Leaf& leaf : leaves) children.push_back(index_in(distinct_leaves, leaf));
+    std::vector<std::vector<ExpandedNode>> nodes(levels_);
+    for (uint32_t level = levels_; level-- > 0;) {
+      std::vector<uint32_t> indexes;
+      size_t at = 0;
+      for (const char mask : masks[level]) {
+        ExpandedNode node{static_cast<unsigned char>(mask), {}};
+        const auto count = static_cast<size_t>(std::popcount(node.mask));
+        node.children.assign(children.begin() + static_cast<ptrdiff_t>(at),
+                             children.begin() + static_cast<ptrdiff_t>(at + count));
+        at += count;
+        indexes.push_back(index_in(nodes[level], node));
+      }
+      children = std::move(indexes);
+    }
+    return words_of(nodes, distinct_leaves);
+  }
+
+ private:
+  std::vector<uint32_t> words_of(const std::vector<std::vector<ExpandedNode>>& nodes,
+                                 const std::vector<Leaf>& leaves) const {
+    std::vector<std::vector<uint32_t>> starts(levels_);
+    uint32_t at = 0;
+    for (uint32_t level = 0; level < levels_; ++level)
+      for (const ExpandedNode& node : nodes[level]) {
+        starts[level].push_back(at);
+        at += 1 + static_cast<uint32_t>(node.children.size());
+      }
+    std::vector<uint32_t> words = {kTileMagic, level_ | levels_ << 8 | uint32_t{bricks_} << 16, at,
+                                   static_cast<uint32_t>(leaves.size())};
+    for (uint32_t level = 0; level < levels_; ++level)
+      for (const ExpandedNode& node : nodes[level]) {
+        words.push_back(node.mask);
+        for (const uint32_t child : node.children)
+          words.push_back(level + 1 < levels_ ? starts[level + 1][child] : child);
+      }
+    for (const Leaf& leaf : leaves) {
+      if (!bricks_) words.insert(words.end(), {leaf.number, 0});
+      words.push_back(static_cast<uint32_t>(leaf.mask));
+      words.push_back(static_cast<uint32_t>(leaf.mask >> 32));
+    }
+    return words;
+  }
+
+  const uint32_t level_, levels_;
+  const bool bricks_;
+};
+
+size_t children_of(std::string_view masks) {
+  size_t children = 0;
+  for (const char mask : masks) {
+    if (mask == 0) refuse_block("expected nodes with children");
+    children += static_cast<size_t>(std::popcount(static_cast<unsigned char>(mask)));
+  }
+  return children;
+}
+
+// Reads the numbers to which the leaves refer. Advances `next` past the new numbers.
+void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next) {
+  const std::string_view is_old = columns.take((leaves.size() + 7) / 8);
+  const auto old = [&](size_t i) { return is_old[i / 8] >> i % 8 & 1; };
+  size_t old_count = 0;
+  for (size_t i = 0; i < leaves.size(); ++i) old_count += static_cast<size_t>(old(i));
+  const std::vector<uint64_t> distances = columns.take_numbers(4, old_count);
+  size_t at = 0;
+  for (size_t i = 0; i < leaves.size(); ++i) {
+    if (old(i)) {
+      const uint64_t distance = distances[at++];
+      if (distance == 0 || distance > next) refuse_block("expected numbers of earlier tiles");
+      leaves[i].number = next - static_cast<uint32_t>(distance);
+    } else {
+      leaves[i].number = next++;
+      if (next == 0) refuse_block("expected fewer tiles");
+    }
+  }
+}
+
+}  // namespace
+
+void TileBlockEncoder::add(const std::vector<uint32_t>& tile) {
+  const uint32_t levels = tile[1] >> 8 & 255;
+  std::vector<uint32_t> nodes = {0}, children;
+  for (uint32_t level = 0; level < levels; ++level, nodes.swap(children)) {
+    children.clear();
+    for (const uint32_t node : nodes) {
+      const uint32_t mask = tile[kTileHeadWords + node];
+      masks_[level].push_back(static_cast<char>(mask));
+      for (int child = 1; child <= std::popcount(mask); ++child)
+        children.push_back(tile[kTileHeadWords + node + static_cast<uint32_t>(child)]);
+    }
+  }
+  for (const uint32_t leaf : nodes) add_leaf(tile, leaf);
+}
+
+void TileBlockEncoder::add_leaf(const std::vector<uint32_t>& tile, size_t leaf) {
+  const bool bricks = has_bricks(tile);
+  const size_t at = leaves_begin(tile) + leaf * (bricks ? 2 : 4), mask = bricks ? at : at + 2;
+  for (size_t byte = 0; byte < bricks_.size(); ++byte)
+    bricks_[byte].push_back(static_cast<char>(tile[mask + byte / 4] >> 8 * (byte % 4)));
+  if (!bricks) {
+    has_references_ = true;
+    const uint32_t number = tile[at];
+    if (number == next_) {
+      ++next_;
+    } else {
+      set_bit(is_old_, leaves_);
+      for (size_t byte = 0; byte < old_.size(); ++byte)
+        old_[byte].push_back(static_cast<char>((next_ - number) >> 8 * byte));
+    }
+  }
+  ++leaves_;
+}
+
+std::string TileBlockEncoder::finish() const {
+  std::string bytes(sizeof first_, '\0');
+  std::memcpy(bytes.data(), &first_, sizeof first_);
+  for (const std::string& column : masks_) bytes += column;
+  for (const std::string& column : bricks_) bytes += column;
+  if (!has_references_) return bytes;
+  std::string bits = is_old_;
+  bits.resize((leaves_ + 7) / 8, '\0');
+  bytes += bits;
+  for (const std::string& column : old_) bytes += column;
+  return bytes;
+}
+
+TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32_t level,
+                            uint32_t count) {
+  const uint32_t end = tile_end(grid_levels, kPackageTileLevels, level), levels = end - level;
+  const bool bricks = end + kBrickLevels == grid_levels;
+  Columns columns(bytes);
+  TileBlock block;
+  std::memcpy(&block.first, columns.take(sizeof block.first).data(), sizeof block.first);
+  block.next = block.first;
+  std::vector<std::string_view> masks;
+  size_t nodes = count;
+  for (uint32_t i = 0; i < levels; ++i) {
+    masks.push_back(columns.take(nodes));
+    nodes = children_of(masks.back());
+  }
+  std::vector<Leaf> leaves;
+  for (const uint64_t mask : columns.take_numbers(8, nodes)) {
+    if (mask == 0) refuse_block("expected leaves with cells");
+    leaves.push_back({mask, 0});
+  }
+  if (!bricks) read_references(columns, leaves, block.next);
+  columns.expect_end();
+  const TileBuilder builder(level, levels, bricks);
+  std::vector<size_t> at(levels + 1, 0);  // the position in each column
+  for (uint32_t tile = 0; tile < count; ++tile) {
+    std::vector<std::string> masks_of_tile;
+    size_t width = 1;
+    for (uint32_t i = 0; i < levels; ++i) {
+      masks_of_tile.emplace_back(masks[i].substr(at[i], width));
+      at[i] += width;
+      width = children_of(masks_of_tile.back());
+    }
+    const auto first = leaves.begin() + static_cast<ptrdiff_t>(at[levels]);
+    block.tiles.push_back(
+        builder.build(masks_of_tile, {first, first + static_cast<ptrdiff_t>(width)}));
+    at[levels] += width;
+  }
+  return block;
+}
+
+}  // namespace voxdag::query

@@ -1,0 +1,223 @@
+#include "query/package/write_package.h"
+
+#include <algorithm>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/base/parallel_for.h"
+#include "core/base/process_limits.h"
+#include "core/format/checksum.h"
+#include "core/format/global/open_global.h"
+#include "core/format/global/watched_file.h"
+#include "query/package/color_bands.h"
+#include "query/package/gzip_block.h"
+#include "query/package/pack_writer.h"
+#include "query/package/package_folder.h"
+#include "query/package/tile_block.h"
+#include "query/package/tile_numbers.h"
+#include "query/tiles/tile.h"
+
+namespace voxdag::query {
+namespace {
+
+constexpr size_t kDigestDigits = 32;
+constexpr uint64_t kWindowBlocks = 64;  // encoded together
+constexpr uint64_t kRootsShare = 16;    // of the memory
+constexpr uint64_t kReadBytes = uint64_t{1} << 20;
+
+// Writes the bands of a file, from coarse to fine.
+class BandWriter {
+ public:
+  BandWriter(const voxdag_reader::File& file, const PackageSpec& spec, const SpillSpace& space,
+             PackWriter& packs, Progress& progress, const CancelToken& cancel)
+      : file_(file),
+        dag_(file),
+        blocks_(file),
+        spec_(spec),
+        space_(space),
+        packs_(packs),
+        progress_(progress),
+        cancel_(cancel),
+        colors_(file, dag_, blocks_, packs, cancel) {}
+
+  void run() {
+    if (dag_.empty()) return;
+    const uint32_t bricks = dag_.grid_levels() - kBrickLevels;
+    progress_.begin_stage("tiles", tile_count(), "tiles");
+    SpillList<uint64_t> root(space_);
+    root.add(0);
+    root.finish();
+    std::unique_ptr<TileNumbers> numbers;
+    const SpillList<uint64_t>* roots = &root;
+    for (uint32_t level = 0; level < bricks; level = end_of(level)) {
+      auto next = write_band(level, *roots);
+      numbers = std::move(next);  // releases the numbers of the band above
+      if (numbers) roots = &numbers->offsets();
+      // The cells of coarse bricks are two levels below the end of the tiles.
+      if (spec_.colors) colors_.write_levels(end_of(level) + kBrickLevels);
+    }
+    if (spec_.colors) colors_.write_levels(dag_.grid_levels());
+    progress_.end_stage();
+  }
+  uint64_t tiles() const { return tiles_; }
+  uint64_t color_pages() const { return colors_.pages(); }
+
+ private:
+  using Tiles = std::vector<std::vector<uint32_t>>;
+
+  uint32_t end_of(uint32_t level) const {
+    return tile_end(dag_.grid_levels(), kPackageTileLevels, level);
+  }
+  uint64_t tile_count() const {
+    uint64_t count = 0;
+    for (uint32_t level = 0; level + kBrickLevels < dag_.grid_levels(); level = end_of(level))
+      count += file_.level(level).node_count;
+    return count;
+  }
+
+  // Writes the tiles of a band. Returns the numbers of the tiles below; null for tiles with bricks.
+  std::unique_ptr<TileNumbers> write_band(uint32_t level, const SpillList<uint64_t>& roots) {
+    const uint32_t end = end_of(level);
+    std::unique_ptr<TileNumbers> below;
+    if (end + kBrickLevels < dag_.grid_levels())
+      below = std::make_unique<TileNumbers>(file_, end, spec_.threads, space_, cancel_);
+    packs_.begin_band(false, level);
+    SpillReader<uint64_t> reader(roots);
+    while (!reader.at_end()) {
+      write_window(level, take_roots(reader), below.get());
+      cancel_.check();
+      if (resident_bytes() > spec_.memory_bytes) file_.release_pages();
+    }
+    if (below) below->offsets().finish();
+    return below;
+  }
+
+  static std::vector<uint64_t> take_roots(SpillReader<uint64_t>& reader) {
+    std::vector<uint64_t> offsets;
+    for (; !reader.at_end() && offsets.size() < kWindowBlocks * kBlockTiles; reader.pop())
+      offsets.push_back(reader.front());
+    return offsets;
+  }
+
+  void write_window(uint32_t level, const std::vector<uint64_t>& offsets, TileNumbers* below) {
+    const size_t count = (offsets.size() + kBlockTiles - 1) / kBlockTiles;
+    std::vector<Tiles> tiles(count);
+    std::vector<uint32_t> next(count, 0);
+    std::vector<std::string> blocks(count);
+    const auto end_of_block = [&](size_t block) {
+      return std::min<size_t>(offsets.size(), (block + 1) * kBlockTiles);
+    };
+    parallel_for(spec_.threads, count, [&](unsigned, size_t block) {
+      for (size_t i = block * kBlockTiles; i < end_of_block(block); ++i)
+        tiles[block].push_back(
+            encode_tile(dag_, kPackageTileLevels, {level, offsets[i]}, &blocks_));
+    });
+    if (below)
+      for (size_t block = 0; block < count; ++block) {
+        next[block] = below->count();
+        for (std::vector<uint32_t>& tile : tiles[block]) number_leaves(tile, *below);
+      }
+    parallel_for(spec_.threads, count, [&](unsigned, size_t block) {
+      TileBlockEncoder encoder(next[block]);
+      for (const std::vector<uint32_t>& tile : tiles[block]) encoder.add(tile);
+      blocks[block] = gzip_block(encoder.finish());
+    });
+    for (size_t block = 0; block < count; ++block)
+      packs_.add_block(blocks[block], tiles[block].size(), 0);
+    tiles_ += offsets.size();
+    progress_.advance(offsets.size());
+  }
+
+  // Replaces the word offsets of the cut-off nodes by their numbers.
+  static void number_leaves(std::vector<uint32_t>& tile, TileNumbers& below) {
+    for (size_t at = leaves_begin(tile); at < tile.size(); at += 4) {
+      tile[at] = below.number(tile[at] | uint64_t{tile[at + 1]} << 32);
+      tile[at + 1] = 0;
+    }
+  }
+
+  const voxdag_reader::File& file_;
+  const DagView dag_;
+  const CheckedBlocks blocks_;
+  const PackageSpec& spec_;
+  const SpillSpace& space_;
+  PackWriter& packs_;
+  Progress& progress_;
+  const CancelToken& cancel_;
+  ColorBands colors_;
+  uint64_t tiles_ = 0;
+};
+
+void write_file(FileSystem& files, const std::string& path, std::string_view contents) {
+  const auto out = files.create(path);
+  out->write_at(0, std::as_bytes(std::span(contents.data(), contents.size())));
+  out->sync();
+  out->close();
+}
+
+// Returns the digest of a package. It changes with every change that a viewer could notice.
+std::string digest_of(const PackageIndex& index) {
+  std::string text = index.manifest + index.directory.name;
+  for (const PackageFile& pack : index.packs) text += pack.name;
+  return sha256_hex(text).substr(0, kDigestDigits);
+}
+
+// Adds the digest, which depends on the packs.
+void complete_manifest(const PackageSpec& spec, PackageIndex& index) {
+  index.manifest = spec.manifest;
+  auto manifest = nlohmann::ordered_json::parse(spec.manifest);
+  manifest["digest"] = digest_of(index);
+  if (!spec.colors) manifest.erase("colors");
+  index.manifest = manifest.dump();
+}
+
+PackageReport report_of(const PackageIndex& index) {
+  PackageReport report;
+  report.packs = index.packs.size();
+  report.bytes = index.directory.bytes;
+  for (const PackageFile& pack : index.packs) report.bytes += pack.bytes;
+  for (const PackageBand& band : index.bands) report.blocks += band.blocks;
+  report.digest = nlohmann::ordered_json::parse(index.manifest)["digest"];
+  return report;
+}
+
+}  // namespace
+
+PackageReport write_package(const voxdag_reader::File& file, const PackageSpec& spec,
+                            const std::vector<ViewerFile>& viewer, FileSystem& files,
+                            Progress& progress, const CancelToken& cancel) {
+  const WatchedFile watched(file);
+  const auto run = [&] {
+    PackageFolder folder(files, spec.output);
+    MemoryBudget budget(spec.memory_bytes);
+    ScratchFolder scratch(files, folder.scratch());
+    const uint64_t list_bytes = std::min(spec.memory_bytes / kRootsShare, spec.list_bytes);
+    const SpillSpace space{scratch, budget, list_bytes, list_bytes,
+                           std::min(kReadBytes, list_bytes)};
+    PackWriter packs(files, folder.new_files(), spec.pack_bytes);
+    BandWriter bands(file, spec, space, packs, progress, cancel);
+    bands.run();
+    PackageIndex index = packs.finish();
+    complete_manifest(spec, index);
+    uint64_t bytes = 0;
+    for (const ViewerFile& page : viewer) {
+      write_file(files, folder.new_files() + "/" + page.name, page.contents);
+      if (page.name != "index.html") index.viewer.push_back({page.name, page.contents.size(), 0});
+      bytes += page.contents.size();
+    }
+    const std::string text = index_text(index);
+    write_file(files, folder.new_files() + "/" + kIndexName, text);
+    watched.check_readable();
+    folder.publish(index);
+    PackageReport report = report_of(index);
+    report.bytes += bytes + text.size();
+    report.files = index.packs.size() + 2 + viewer.size();
+    report.tiles = bands.tiles();
+    report.color_pages = bands.color_pages();
+    return report;
+  };
+  return watched.run([&] { return with_reader_errors(run); });
+}
+
+}  // namespace voxdag::query

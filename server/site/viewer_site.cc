@@ -1,0 +1,94 @@
+#include "server/site/viewer_site.h"
+
+#include <algorithm>
+#include <sstream>
+#include <stdexcept>
+
+#include "server/site/module_bundle.h"
+#include "server/web/assets.h"
+
+namespace voxdag::server {
+namespace {
+
+const std::string& asset(const std::string& name) {
+  for (const Asset& asset : embedded_assets())
+    if (asset.name == name) return asset.contents;
+  throw std::logic_error("the viewer has no file " + name);
+}
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '&')
+      result += "&amp;";
+    else if (c == '<')
+      result += "&lt;";
+    else if (c == '>')
+      result += "&gt;";
+    else if (c == '"')
+      result += "&quot;";
+    else
+      result += c;
+  }
+  return result;
+}
+
+// True if a line of the viewer's page refers to other files of the service.
+bool is_of_service(const std::string& line) {
+  constexpr const char* kParts[] = {"<link ", "<script ", "<title>", "id=\"home\"",
+                                    "<!-- Loads the modules"};
+  return std::ranges::any_of(kParts,
+                             [&](const char* part) { return line.find(part) != line.npos; });
+}
+
+// Returns the page of the viewer without references to the service. `head` is inserted at the end
+// of the page's head.
+std::string page_with_head(const std::string& head) {
+  std::istringstream lines(asset("viewer.html"));
+  std::string page;
+  for (std::string line; std::getline(lines, line);) {
+    if (is_of_service(line)) continue;
+    if (line == "</head>") page += head;
+    page += line + '\n';
+  }
+  return page;
+}
+
+std::string percent_encoded(const std::string& text) {
+  std::string result;
+  for (const char c : text) {
+    if (c == '%')
+      result += "%25";
+    else if (c == '#')
+      result += "%23";
+    else if (c == '"')
+      result += "%22";
+    else if (c == '<')
+      result += "%3c";
+    else if (c == '>')
+      result += "%3e";
+    else if (c != '\n')
+      result += c;
+  }
+  return result;
+}
+
+std::string head_of(const std::string& title, const std::string& script) {
+  std::string head = "  <title>" + escaped(title) + "</title>\n";
+  head += "  <meta name=\"voxdag-package\" content=\"./\">\n";
+  head += "  <link rel=\"icon\" href=\"data:image/svg+xml," + percent_encoded(asset("icon.svg")) +
+          "\">\n";
+  head += "  <script type=\"module\" src=\"" + script + "\"></script>\n  <style>\n";
+  for (const char* name : {"app.css", "parts.css", "viewer.css"}) head += asset(name);
+  return head + "  </style>\n";
+}
+
+}  // namespace
+
+std::vector<query::ViewerFile> viewer_site(const std::string& title) {
+  const std::string module = bundle_modules("viewer/package/main.js", asset);
+  const std::string name = query::hashed_name("viewer", module, ".js");
+  return {{name, module}, {"index.html", page_with_head(head_of(title, name))}};
+}
+
+}  // namespace voxdag::server

@@ -1,0 +1,188 @@
+// Decodes the blocks of a package (docs/format.md, "Packages"). Blocks come from the network. Every
+// count is checked, so a damaged block is an error.
+
+const kTileMagic = 0x31544456;
+const kReferenceBytes = 4;
+
+const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
+  let bits = 0;
+  for (let rest = i; rest; rest &= rest - 1) ++bits;
+  return bits;
+});
+
+// Reads the columns of a block.
+class Columns {
+  constructor(bytes) {
+    this.bytes = bytes;
+    this.at = 0;
+  }
+  take(count) {
+    if (this.at + count > this.bytes.length) throw new Error("A block ends too early.");
+    this.at += count;
+    return this.bytes.subarray(this.at - count, this.at);
+  }
+  // Reads `count` numbers of 32 bits. The column of the lowest bytes comes first.
+  takeWords(count) {
+    const words = new Uint32Array(count);
+    for (let byte = 0; byte < kReferenceBytes; ++byte) {
+      const column = this.take(count);
+      for (let i = 0; i < count; ++i) words[i] |= column[i] << 8 * byte;
+    }
+    return words;
+  }
+  expectEnd() {
+    if (this.at !== this.bytes.length) throw new Error("A block has bytes after its columns.");
+  }
+}
+
+// A block of tiles. Makes the words of a tile (docs/format.md, "Tiles") when they are needed.
+export class TileBlock {
+  // `shape` is the tileShape() of the level. `count` is the number of tiles in the block.
+  constructor(bytes, level, {levels, bricks}, count) {
+    const columns = new Columns(bytes), head = columns.take(4);
+    Object.assign(this, {level, levels, bricks, count});
+    this.size = bytes.length;
+    this.masks = [];   // by level: the child masks of all nodes
+    this.starts = [];  // by level: the index of each tile's first node; at the end, of its leaves
+    let starts = Uint32Array.from({length: count + 1}, (_, i) => i);
+    for (let i = 0; i < levels; ++i) {
+      const masks = columns.take(starts[count]);
+      this.masks.push(masks);
+      this.starts.push(starts);
+      starts = childStarts(masks, starts);
+    }
+    this.starts.push(starts);
+    const leaves = starts[count];
+    this.low = columns.takeWords(leaves);
+    this.high = columns.takeWords(leaves);
+    const next = new DataView(head.buffer, head.byteOffset).getUint32(0, true);
+    this.numbers = bricks ? null : readNumbers(columns, leaves, next);
+    columns.expectEnd();
+  }
+
+  // Returns the words of tile `index` of the block. Equal nodes and leaves occur once.
+  tile(index) {
+    const {levels, bricks} = this, leaves = [];
+    let children = this.leavesOf(index, leaves);
+    const nodes = new Array(levels);
+    for (let level = levels; level-- > 0;) {
+      nodes[level] = [];
+      children = this.nodesOf(index, level, children, nodes[level]);
+    }
+    const starts = [];
+    let at = 0;
+    for (const level of nodes) starts.push(level.map((node) => (at += node.length) - node.length));
+    const words = new Uint32Array(4 + at + leaves.length * (bricks ? 2 : 4));
+    words.set([kTileMagic, this.level | levels << 8 | bricks << 16, at, leaves.length]);
+    let to = 4;
+    nodes.forEach((level, i) => level.forEach((node) => {
+      words[to++] = node[0];
+      for (let c = 1; c < node.length; ++c)
+        words[to++] = i + 1 < levels ? starts[i + 1][node[c]] : node[c];
+    }));
+    for (const leaf of leaves) {
+      if (!bricks) {
+        words[to] = this.numbers[leaf];
+        to += 2;
+      }
+      words[to++] = this.low[leaf];
+      words[to++] = this.high[leaf];
+    }
+    return words;
+  }
+
+  // Adds the distinct leaves of a tile to `leaves`, as indexes in the block. Returns the index in
+  // `leaves` of each leaf of the tile.
+  leavesOf(index, leaves) {
+    const starts = this.starts[this.levels], {low, high, numbers} = this, indexes = [];
+    for (let leaf = starts[index]; leaf < starts[index + 1]; ++leaf) {
+      let known = leaves.findIndex(
+          numbers ? (other) => numbers[other] === numbers[leaf] :
+                    (other) => low[other] === low[leaf] && high[other] === high[leaf]);
+      if (known < 0) known = leaves.push(leaf) - 1;
+      indexes.push(known);
+    }
+    return indexes;
+  }
+
+  // Adds the distinct nodes of a level of a tile to `nodes`, as [mask, ...indexes of children].
+  // Returns the index in `nodes` of each node.
+  nodesOf(index, level, children, nodes) {
+    const masks = this.masks[level], starts = this.starts[level], indexes = [];
+    let from = 0;
+    for (let at = starts[index]; at < starts[index + 1]; ++at) {
+      const count = kPopcount[masks[at]], node = [masks[at], ...children.slice(from, from + count)];
+      from += count;
+      let known = nodes.findIndex(
+          (other) => other.length === node.length && other.every((word, i) => word === node[i]));
+      if (known < 0) known = nodes.push(node) - 1;
+      indexes.push(known);
+    }
+    return indexes;
+  }
+}
+
+function childStarts(masks, starts) {
+  const children = new Uint32Array(starts.length);
+  let at = 0, sum = 0;
+  for (let tile = 0; tile + 1 < starts.length; ++tile) {
+    for (; at < starts[tile + 1]; ++at) {
+      if (masks[at] === 0) throw new Error("A block has a node without children.");
+      sum += kPopcount[masks[at]];
+    }
+    children[tile + 1] = sum;
+  }
+  return children;
+}
+
+// Returns the numbers of the cut-off nodes. `next` is the first new number.
+function readNumbers(columns, count, next) {
+  const old = columns.take(Math.ceil(count / 8)), numbers = new Uint32Array(count);
+  const isOld = (i) => old[i >>> 3] >>> (i & 7) & 1;
+  let oldCount = 0;
+  for (let i = 0; i < count; ++i) oldCount += isOld(i);
+  const distances = columns.takeWords(oldCount);
+  for (let i = 0, at = 0; i < count; ++i) {
+    if (!isOld(i)) {
+      numbers[i] = next++;
+      continue;
+    }
+    if (distances[at] === 0 || distances[at] > next)
+      throw new Error("A block refers to a tile that does not exist.");
+    numbers[i] = next - distances[at++];
+  }
+  return numbers;
+}
+
+// Returns the color pages of a block: Morton code of the page's position -> words of the page.
+export function decodeColorBlock(bytes) {
+  const words = new Uint32Array(bytes.slice().buffer, 0, bytes.length >>> 2), count = words[0];
+  let at = 1 + 3 * count;
+  if (bytes.length % 4 !== 0 || !(count > 0) || at > words.length)
+    throw new Error("A block of color pages has a wrong length.");
+  const pages = new Map();
+  for (let i = 0; i < count; ++i) {
+    const length = words[1 + 2 * count + i];
+    if (length === 0 || at + length > words.length)
+      throw new Error("A block of color pages ends too early.");
+    pages.set(words[1 + i] + words[1 + count + i] * 2 ** 32, words.slice(at, at + length));
+    at += length;
+  }
+  if (at !== words.length) throw new Error("A block of color pages has words after its pages.");
+  return pages;
+}
+
+// Returns the Morton code of a page's position. Codes have up to 51 bits, so they are computed
+// without 32-bit operations.
+export function mortonCode([x, y, z]) {
+  let code = 0;
+  for (let bit = 16; bit >= 0; --bit)
+    code = 8 * code + 4 * (x >>> bit & 1) + 2 * (y >>> bit & 1) + (z >>> bit & 1);
+  return code;
+}
+
+// Resolves to the decompressed bytes. Rejects if they do not match their checksum.
+export async function gunzip(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}

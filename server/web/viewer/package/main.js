@@ -1,0 +1,4 @@
+// The page of `voxdag publish`.
+
+import "./published.js";
+import "../main.js";

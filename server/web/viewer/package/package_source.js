@@ -1,0 +1,261 @@
+// Reads tiles and color pages from a package (docs/format.md, "Packages"), which any web server can
+// serve. The counterpart of TileSource, with the same functions. A tile's address is {level,
+// offset}, and `offset` is the tile's number in its level.
+
+import {checkManifest, TileError} from "../tile_source.js";
+import {tileShape} from "../tiles/tile_format.js";
+
+import {decodeColorBlock, gunzip, mortonCode, TileBlock} from "./block_format.js";
+import {Directory} from "./directory.js";
+
+const kFormat = "voxdag package", kVersion = 1;
+const kBlockTiles = 64;
+const kMaxGap = 16 * 1024;         // bytes between two blocks that are fetched together
+const kMaxRange = 1 << 20;         // bytes that are fetched together
+const kMaxCachedBytes = 32 << 20;  // decompressed blocks
+const kLookAgainMs = 5000;
+
+const kReplaced = {
+  code: "replaced",
+  message: "The files were replaced by other ones: reload the page."
+};
+const kRemoved = {
+  code: "removed",
+  message: "The files were removed: their missing parts cannot be loaded."
+};
+
+export class PackageSource {
+  // `files`: PackageFiles, or an object with the same functions.
+  constructor(files) {
+    this.files = files;
+    this.info = null;
+    this.ended = null;  // {code, message} after the files were removed or replaced
+    this.damage = {
+      code: "damaged",
+      message:
+          "Part of the files is missing or damaged and drawn coarse: run voxdag publish --check."
+    };
+    this.blocks = new Map();  // block -> promise of the decoded block, most recently used last
+    this.cachedBytes = 0;
+    this.lookedMs = -Infinity;
+    this.looking = null;
+  }
+
+  get timeoutMs() {
+    return this.files.timeoutMs;
+  }
+  get fetchedBytes() {
+    return this.files.fetchedBytes;
+  }
+  get requestCount() {
+    return this.files.requestCount;
+  }
+  get batchMax() {
+    return this.info.batch_max;
+  }
+
+  async manifest() {
+    const index = await this.fetchIndex();
+    checkManifest(index.manifest);
+    this.info = index.manifest;
+    this.packs = index.packs;
+    this.bands = index.bands;
+    this.directory = new Directory(this.files, index);
+    this.warmUp();
+    return this.info;
+  }
+
+  // Requests the directory and the first pack, which every view needs.
+  warmUp() {
+    if (this.packs.length === 0) return;
+    this.directory.page(0).catch(() => {});
+    this.files.read(this.packs[0], 0, this.packs[0].bytes).catch(() => {});
+  }
+
+  async fetchIndex(signal) {
+    let index = null;
+    try {
+      index = JSON.parse(await this.files.text("package.json", signal));
+    } catch (error) {
+      if (error instanceof TileError) throw error;
+    }
+    if (index?.format !== kFormat || index.version !== kVersion)
+      throw new TileError(
+          200, `package.json is not the index of a package of version ${kVersion}.`);
+    return index;
+  }
+
+  // Resolves to the words of the tiles, in the same order. If a tile's block is missing or damaged,
+  // its place has a TileError. Throws TileError if the server does not answer.
+  fetchTiles(nodes, options = {}) {
+    return this.fetchItems(nodes, options, async ({level, offset}) => {
+      const band = this.bandOf(level, "tiles");
+      if (!(offset < this.bands[band].tiles))
+        throw new TileError(404, `Level ${level} has no tile ${offset}.`);
+      return this.directory.firstBlocks[band] + Math.floor(offset / kBlockTiles);
+    }, (block, {offset}) => block.tile(offset % kBlockTiles));
+  }
+
+  // Like fetchTiles(), for color pages.
+  fetchColors(pages, options = {}) {
+    return this.fetchItems(
+        pages, options,
+        ({level, position}) =>
+            this.directory.colorBlock(this.bandOf(level, "pages"), mortonCode(position), options),
+        (block, {position}) => block.get(mortonCode(position)) ?? new Uint32Array(1));
+  }
+
+  bandOf(level, kind) {
+    const band = this.bands.findIndex((each) => each.level === level && each[kind] !== undefined);
+    if (band < 0) throw new TileError(404, `The package has no ${kind} of level ${level}.`);
+    return band;
+  }
+
+  async fetchItems(items, options, blockOf, take) {
+    const blocks = await Promise.all(items.map((item) => outcomeOf(blockOf(item))));
+    const numbers = new Set(blocks.filter(({error}) => !error).map(({value}) => value));
+    await this.load([...numbers], options);
+    const results = await Promise.all(blocks.map(
+        ({value, error}) => error ? {error} : outcomeOf(this.blocks.get(value) ?? missing(value))));
+    const failure = results.find(({error}) => error && !isOfOneItem(error));
+    if (failure) throw failure.error;
+    if (results.some(({error}) => error?.isMissing)) await this.lookAgain(options.signal);
+    const answers = results.map(({value, error}, i) => {
+      try {
+        return error ?? take(value, items[i]);
+      } catch (damage) {
+        return new TileError(200, damage.message);
+      }
+    });
+    this.evict();
+    return answers;
+  }
+
+  // Loads blocks that are not loaded. Blocks that are close together are fetched with one request.
+  async load(blocks, options) {
+    const wanted = [];
+    for (const block of blocks) {
+      const known = this.blocks.get(block);
+      this.blocks.delete(block);
+      if (known) this.blocks.set(block, known);
+      else wanted.push(block);
+    }
+    const places = await Promise.all(wanted.map(async (block) => {
+      const {value, error} = await outcomeOf(this.directory.place(block, options));
+      return {block, error, ...value};
+    }));
+    for (const {block, error} of places)
+      if (error) this.keep(block, Promise.reject(error));
+    const placed = places.filter(({error}) => !error);
+    for (const group of merged(placed)) this.fetchGroup(group, options);
+  }
+
+  fetchGroup(group, options) {
+    const {pack, offset} = group[0], last = group.at(-1);
+    const length = last.offset + last.bytes - offset;
+    const read = () => this.files.read(this.packs[pack], offset, length, options);
+    const reads = read();
+    for (const each of group) {
+      const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
+      const decode = (bytes) => this.decode(each.block, part(bytes), bytes.isRange);
+      this.keep(each.block, reads.then(decode).catch((error) => {
+        // Without an intact range so far, the server may send wrong ranges.
+        if (error.status !== 200 || this.files.rangesAreProven || !this.files.hasRanges)
+          throw error;
+        this.files.hasRanges = false;
+        return read().then(decode);
+      }));
+    }
+  }
+
+  // `isRange` is true if the bytes are from a range that the server has sent.
+  async decode(block, bytes, isRange) {
+    try {
+      const plain = await gunzip(bytes), decoded = this.parse(block, plain);
+      if (isRange) this.files.rangesAreProven = true;
+      decoded.byteSize = plain.length;
+      this.cachedBytes += plain.length;
+      return decoded;
+    } catch (error) {
+      throw new TileError(200, `Block ${block} of the package is damaged: ${error.message}`);
+    }
+  }
+
+  parse(block, plain) {
+    const {firstBlocks} = this.directory;
+    const band = firstBlocks.findLastIndex((first) => first <= block);
+    const {level, tiles} = this.bands[band];
+    if (tiles === undefined) return decodeColorBlock(plain);
+    const first = (block - firstBlocks[band]) * kBlockTiles;
+    return new TileBlock(
+        plain, level, tileShape(this.info, level), Math.min(kBlockTiles, tiles - first));
+  }
+
+  keep(block, loads) {
+    this.blocks.set(block, loads);
+    loads.then((decoded) => loads.byteSize = decoded.byteSize, () => {
+      if (this.blocks.get(block) === loads) this.blocks.delete(block);
+    });
+  }
+
+  // Forgets the least recently used blocks. Blocks that are being loaded have no size yet.
+  evict() {
+    for (const [block, loads] of this.blocks) {
+      if (this.cachedBytes <= kMaxCachedBytes) return;
+      if (!loads.byteSize) continue;
+      this.blocks.delete(block);
+      this.cachedBytes -= loads.byteSize;
+    }
+  }
+
+  // Checks, after a file was not found, whether the package still exists. Sets `ended` if it was
+  // removed or replaced.
+  async lookAgain(signal) {
+    if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
+    this.looking ??= this.look(signal).finally(() => this.looking = null);
+    await this.looking;
+  }
+
+  async look(signal) {
+    try {
+      const index = await this.fetchIndex(signal);
+      if (index.manifest?.digest !== this.info.digest) this.ended = kReplaced;
+      this.lookedMs = performance.now();
+    } catch (error) {
+      if (error.isMissing) this.ended = kRemoved;
+    }
+  }
+}
+
+// Resolves to {value}, or to {error} if the promise is rejected.
+async function outcomeOf(promise) {
+  try {
+    return {value: await promise};
+  } catch (error) {
+    return {error};
+  }
+}
+
+function missing(block) {
+  return Promise.reject(new TileError(200, `Block ${block} of the package is damaged.`));
+}
+
+// True if the error concerns one file or block. Other files and blocks can still be loaded.
+function isOfOneItem(error) {
+  return error instanceof TileError && (error.isMissing || error.status === 200);
+}
+
+// Divides places of blocks into groups that are close together in their pack.
+function merged(places) {
+  places.sort((a, b) => a.pack - b.pack || a.offset - b.offset);
+  const groups = [];
+  for (const place of places) {
+    const group = groups.at(-1), first = group?.[0], last = group?.at(-1);
+    const isClose = group && first.pack === place.pack &&
+        place.offset - last.offset - last.bytes <= kMaxGap &&
+        place.offset + place.bytes - first.offset <= kMaxRange;
+    if (isClose) group.push(place);
+    else groups.push([place]);
+  }
+  return groups;
+}

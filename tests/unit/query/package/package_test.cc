@@ -1,0 +1,335 @@
+// Tests packages: their tiles and color pages must be those of the file, and damage must be found.
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "core/format/global/open_global.h"
+#include "core/geometry/morton.h"
+#include "query/package/package_reader.h"
+#include "query/package/tile_block.h"
+#include "query/package/write_package.h"
+#include "query/tiles/color_page.h"
+#include "query/tiles/tile.h"
+#include "tests/support/error_of.h"
+#include "tests/support/faulty_files.h"
+#include "tests/unit/core/format/color/colored_files.h"
+#include "tests/unit/query/query_files.h"
+
+namespace voxdag::query {
+namespace {
+
+namespace fs = std::filesystem;
+using PackageWords = std::vector<uint32_t>;
+
+class Package : public testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return folder_.file(name); }
+  PackageSpec spec(const voxdag_reader::File& file, const std::string& output) const {
+    nlohmann::ordered_json manifest = {{"levels", file.grid_levels()}, {"tile_levels", 2}};
+    if (file.has_colors()) manifest["colors"] = {{"levels", file.color_levels()}};
+    PackageSpec spec;
+    spec.output = path(output);
+    spec.manifest = manifest.dump();
+    spec.memory_bytes = uint64_t{64} << 20;
+    return spec;
+  }
+  PackageReport write(const voxdag_reader::File& file, const PackageSpec& spec) {
+    return write_package(file, spec, viewer_, system_files(), progress_, never_);
+  }
+  void write_random(const std::string& output, int edge = 128) {
+    const QueryFile scene(random_voxels(5, edge));
+    const auto file = open_global_file(scene.path());
+    write(*file, spec(*file, output));
+  }
+  void check(const std::string& output) {
+    PackageReader(system_files(), path(output)).check(progress_, never_);
+  }
+  std::string check_error(const std::string& output) {
+    return error_of([&] { check(output); }).message();
+  }
+  std::vector<std::string> names(const std::string& folder) const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+      if (entry.is_regular_file()) names.push_back(fs::relative(entry.path(), folder));
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  std::map<std::string, std::string> contents(const std::string& output) const {
+    std::map<std::string, std::string> contents;
+    for (const std::string& name : names(path(output)))
+      contents[name] = read_bytes(path(output) + "/" + name);
+    return contents;
+  }
+  std::string file_that_begins(const std::string& output, const std::string& begin) const {
+    for (const std::string& name : names(path(output)))
+      if (name.starts_with(begin)) return path(output) + "/" + name;
+    ADD_FAILURE() << begin;
+    return "";
+  }
+
+  TemporaryFolder folder_;
+  NoProgress progress_;
+  CancelToken never_;
+  std::vector<ViewerFile> viewer_;
+};
+
+// Compares all tiles of a package with the tiles that the service makes, and returns the number of
+// tiles.
+uint64_t compare_tiles(const voxdag_reader::File& file, const PackageReader& package) {
+  const DagView dag(file);
+  const uint32_t bricks = file.brick_level();
+  std::vector<uint64_t> offsets = {0};  // of the band, by number
+  uint64_t count = 0;
+  for (uint32_t level = 0; level < bricks;) {
+    std::map<uint64_t, uint64_t> below;  // number -> word offset
+    for (uint64_t number = 0; number < offsets.size(); ++number, ++count) {
+      PackageWords expected = encode_tile(dag, kPackageTileLevels, {level, offsets[number]});
+      PackageWords tile = package.tile(level, number);
+      EXPECT_EQ(tile.size(), expected.size());
+      if (!(tile.at(1) >> 16 & 1))
+        for (size_t at = 4 + tile[2]; at < tile.size(); at += 4) {
+          const uint64_t offset = expected.at(at) | uint64_t{expected[at + 1]} << 32;
+          EXPECT_EQ(below.emplace(tile[at], offset).first->second, offset);
+          tile[at] = expected[at];
+          tile[at + 1] = expected[at + 1];
+        }
+      EXPECT_EQ(tile, expected) << level << " " << number;
+    }
+    level = tile_end(file.grid_levels(), kPackageTileLevels, level);
+    offsets.clear();
+    for (const auto& [number, offset] : below) {
+      EXPECT_EQ(number, offsets.size());
+      offsets.push_back(offset);
+    }
+    EXPECT_EQ(offsets.size(), level < bricks ? file.level(level).node_count : 0);
+  }
+  return count;
+}
+
+TEST_F(Package, HasTheTilesOfTheFile) {
+  for (const int edge : {8, 16, 64, 128}) {
+    const QueryFile scene(random_voxels(static_cast<uint64_t>(edge), edge));
+    const auto file = open_global_file(scene.path());
+    const PackageReport report = write(*file, spec(*file, "p" + std::to_string(edge)));
+    const PackageReader package(system_files(), path("p" + std::to_string(edge)));
+    EXPECT_EQ(compare_tiles(*file, package), report.tiles);
+    package.check(progress_, never_);
+    EXPECT_EQ(error_of([&] { package.tile(0, 1); }).code(), ErrorCode::kNotFound);
+    EXPECT_EQ(error_of([&] { package.tile(77, 0); }).code(), ErrorCode::kNotFound);
+  }
+}
+
+TEST_F(Package, OfFilesWithoutTiles) {
+  for (const int edge : {4, 16}) {
+    const std::string name = "e" + std::to_string(edge);
+    oracle::Voxels voxels(edge);
+    if (edge == 4) voxels.set(1, 2, 3);
+    const QueryFile scene(voxels);
+    const auto file = open_global_file(scene.path());
+    EXPECT_EQ(write(*file, spec(*file, name)).tiles, 0u);
+    check(name);
+  }
+}
+
+TEST_F(Package, HasTheColorsOfTheFile) {
+  for (const uint32_t color_levels : {3u, 8u}) {
+    const ColoredScene scene{9, color_levels, random_codes(4, 9, 1500),
+                             smooth_colors(color_levels, 3)};
+    write_colored(path("c.vdag"), scene, true);
+    const auto file = open_global_file(path("c.vdag"));
+    const DagView dag(*file);
+    ColorPages pages(*file, dag);
+    const std::string output = "c" + std::to_string(color_levels);
+    const PackageReport report = write(*file, spec(*file, output));
+    const PackageReader package(system_files(), path(output));
+    package.check(progress_, never_);
+    uint64_t count = 0;
+    for (uint32_t level = 0; level <= color_levels; ++level) {
+      std::set<uint64_t> codes;
+      for (const uint64_t code : scene.cells(level)) codes.insert(code >> 9);
+      for (const uint64_t code : codes) {
+        uint32_t x, y, z;
+        morton_decode(code, x, y, z);
+        ASSERT_EQ(package.color_page(level, {x, y, z}), pages.encode({level, {x, y, z}}));
+        ++count;
+      }
+    }
+    EXPECT_EQ(count, report.color_pages);
+    PackageSpec gray = spec(*file, "gray" + std::to_string(color_levels));
+    gray.colors = false;
+    EXPECT_EQ(write(*file, gray).color_pages, 0u);
+    EXPECT_EQ(PackageReader(system_files(), gray.output).index().manifest.find("colors"),
+              std::string::npos);
+  }
+}
+
+// The bytes do not depend on threads, on the memory, or on the layout of the file.
+TEST_F(Package, IsTheSameForAnyRun) {
+  const oracle::Voxels voxels = random_voxels(3, 128);
+  const QueryFile scene(voxels), wide(voxels, 64);
+  const auto file = open_global_file(scene.path()), wide_file = open_global_file(wide.path());
+  write(*file, spec(*file, "a"));
+  PackageSpec other = spec(*file, "b");
+  other.threads = 4;
+  other.list_bytes = 64;
+  write(*file, other);
+  EXPECT_EQ(contents("a"), contents("b"));
+  write(*wide_file, spec(*wide_file, "w"));
+  EXPECT_EQ(contents("a"), contents("w"));
+}
+
+// A package without its last packs still has all tiles of the coarser bands.
+TEST_F(Package, IsCoarserWithoutItsLastPacks) {
+  const ColoredScene scene{12, 3, random_codes(8, 12, 20000), smooth_colors(3, 3)};
+  write_colored(path("c.vdag"), scene, false);
+  const auto file = open_global_file(path("c.vdag"));
+  PackageSpec small = spec(*file, "p");
+  small.pack_bytes = 1024;
+  ASSERT_GT(write(*file, small).packs, 3u);
+  const PackageReader package(system_files(), path("p"));
+  const std::vector<PackageFile>& packs = package.index().packs;
+  for (size_t i = 1; i < packs.size(); ++i) fs::remove(path("p/") + packs[i].name);
+  const PackageWords root = package.tile(0, 0);
+  EXPECT_EQ(root, [&] {
+    PackageWords words = encode_tile(DagView(*file), 2, {0, 0});
+    for (size_t i = 0, at = 4 + words[2]; at < words.size(); at += 4, ++i)
+      words[at] = static_cast<uint32_t>(i);
+    return words;
+  }());
+  const uint32_t last = package.index().bands.back().level;
+  EXPECT_EQ(error_of([&] { package.tile(last, package.index().bands.back().items - 1); }).code(),
+            ErrorCode::kNotFound);
+  EXPECT_THAT(check_error("p"), testing::HasSubstr(packs[1].name));
+}
+
+TEST_F(Package, NamesDamage) {
+  write_random("p");
+  const std::string pack = file_that_begins("p", "packs/0-"),
+                    directory = file_that_begins("p", "directory-");
+  for (const std::string& file : {pack, directory}) {
+    const std::string intact = read_bytes(file);
+    std::string flipped = intact;
+    flipped[flipped.size() / 2] = static_cast<char>(flipped[flipped.size() / 2] ^ 4);
+    write_bytes(file, flipped);
+    EXPECT_THAT(check_error("p"), testing::StartsWith(file));
+    write_bytes(file, intact.substr(0, intact.size() - 1));
+    EXPECT_THAT(check_error("p"), testing::StartsWith(file));
+    fs::remove(file);
+    EXPECT_THAT(check_error("p"), testing::HasSubstr(file));
+    write_bytes(file, intact);
+  }
+  check("p");
+}
+
+// No change of one byte of the index crashes the reader or passes unnoticed as another number of
+// tiles.
+TEST_F(Package, RefusesChangedIndexes) {
+  write_random("p", 64);
+  const std::string file = path("p/package.json"), intact = read_bytes(file);
+  for (size_t at = 0; at < intact.size(); ++at) {
+    std::string changed = intact;
+    changed[at] = changed[at] == '9' ? '1' : '9';
+    write_bytes(file, changed);
+    try {
+      check("p");
+    } catch (const Error& error) {
+      EXPECT_THAT(error.message(), testing::HasSubstr(path("p")));
+    }
+  }
+  write_bytes(file, "{}");
+  EXPECT_THAT(check_error("p"), testing::HasSubstr("'format': expected 'voxdag package'"));
+}
+
+// Damaged blocks give an error, or tiles that fit their block.
+TEST_F(Package, SurvivesDamagedBlocks) {
+  const QueryFile scene(random_voxels(7, 64));
+  const auto file = open_global_file(scene.path());
+  const DagView dag(*file);
+  TileBlockEncoder encoder(0);
+  PackageWords root = encode_tile(dag, 2, {0, 0});
+  for (size_t i = 0, at = 4 + root[2]; at < root.size(); at += 4, ++i)
+    root[at] = static_cast<uint32_t>(i);
+  encoder.add(root);
+  const std::string block = encoder.finish();
+  EXPECT_EQ(decode_tile_block(block, 6, 0, 1).tiles[0], root);
+  for (size_t at = 0; at < block.size(); ++at)
+    for (int bit = 0; bit < 8; ++bit) {
+      std::string changed = block;
+      changed[at] = static_cast<char>(changed[at] ^ 1 << bit);
+      try {
+        EXPECT_EQ(decode_tile_block(changed, 6, 0, 1).tiles.size(), 1u);
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      }
+    }
+  for (size_t size = 0; size < block.size(); ++size)
+    EXPECT_THROW(decode_tile_block(block.substr(0, size), 6, 0, 1), Error);
+}
+
+TEST_F(Package, ReplacesOnlyPackages) {
+  fs::create_directories(path("other"));
+  write_bytes(path("other/mine.txt"), "mine");
+  const QueryFile scene(random_voxels(5, 32)), second(random_voxels(6, 64));
+  const auto file = open_global_file(scene.path()), file2 = open_global_file(second.path());
+  EXPECT_THAT(error_of([&] { write(*file, spec(*file, "other")); }).message(),
+              testing::HasSubstr("has other files: expected a new folder"));
+  EXPECT_EQ(names(path("other")), std::vector<std::string>{"mine.txt"});
+  write_bytes(path("file"), "mine");
+  EXPECT_THAT(error_of([&] { write(*file, spec(*file, "file")); }).message(),
+              testing::HasSubstr("is a file"));
+  EXPECT_EQ(error_of([&] { write(*file, spec(*file, "no/p")); }).code(), ErrorCode::kNotFound);
+
+  fs::create_directories(path("p"));  // an empty folder
+  write(*file, spec(*file, "p"));
+  write_bytes(path("p/CNAME"), "example.org");
+  write(*file2, spec(*file2, "p"));
+  check("p");
+  write(*file2, spec(*file2, "q"));
+  auto expected = contents("q");
+  expected["CNAME"] = "example.org";
+  EXPECT_EQ(contents("p"), expected);
+  for (const auto& entry : fs::directory_iterator(folder_.path()))
+    EXPECT_EQ(entry.path().string().find(".work-"), std::string::npos);
+}
+
+// Whenever the disk fails, the folder has the old package or the new one.
+TEST_F(Package, IsCompleteAfterFaults) {
+  const QueryFile scene(random_voxels(5, 8)), second(random_voxels(6, 8));
+  const auto file = open_global_file(scene.path()), file2 = open_global_file(second.path());
+  for (const crash::Fault fault : {crash::Fault::kNoSpace, crash::Fault::kIoError}) {
+    bool failed = true;
+    for (uint64_t at = 1; failed; at += 2) {
+      fs::remove_all(path("p"));
+      fs::remove(path("p.lock"));
+      write(*file, spec(*file, "p"));
+      crash::FaultyFiles faulty({fault, at});
+      failed = false;
+      try {
+        write_package(*file2, spec(*file2, "p"), {}, faulty, progress_, never_);
+      } catch (const Error& error) {
+        failed = true;
+        EXPECT_EQ(error.code(),
+                  fault == crash::Fault::kNoSpace ? ErrorCode::kNoSpace : ErrorCode::kIo);
+      }
+      check("p");
+    }
+  }
+}
+
+TEST_F(Package, LeavesNothingAfterErrors) {
+  const QueryFile scene(random_voxels(5, 32));
+  const auto file = open_global_file(scene.path());
+  CancelToken canceled;
+  canceled.cancel();
+  EXPECT_EQ(error_of([&] {
+              write_package(*file, spec(*file, "p"), {}, system_files(), progress_, canceled);
+            }).code(),
+            ErrorCode::kCanceled);
+  EXPECT_TRUE(names(folder_.path()).empty());
+}
+
+}  // namespace
+}  // namespace voxdag::query

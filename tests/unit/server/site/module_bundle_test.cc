@@ -1,0 +1,52 @@
+#include "server/site/module_bundle.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <stdexcept>
+
+#include "query/package/package_index.h"
+#include "server/site/viewer_site.h"
+
+namespace voxdag::server {
+namespace {
+
+std::string bundle(const std::map<std::string, std::string>& sources) {
+  return bundle_modules("a/main.js",
+                        [&](const std::string& path) -> std::string { return sources.at(path); });
+}
+
+TEST(ModuleBundle, PutsModulesBeforeTheirImporters) {
+  EXPECT_EQ(
+      bundle({{"a/main.js",
+               "// A comment.\nimport {\n  f,\n  g as h\n} from \"../b/b.js\";\nimport "
+               "\"./c.js\";\n\nf(h);\n"},
+              {"b/b.js", "export function f() {\n  return 1;  // one\n}\nexport const g = 2;\n"},
+              {"a/c.js", "import {g} from \"../b/b.js\";\nexport {g};\n"}}),
+      "const module0 = (() => {\nfunction f() {\nreturn 1;  // one\n}\nconst g = 2;\n"
+      "return {f, g};\n})();\n"
+      "const module1 = (() => {\nconst {g} = module0;\nreturn {g};\n})();\n"
+      "const module2 = (() => {\nconst {\n  f,\n  g: h\n} = module0;\nf(h);\nreturn {};\n})();\n");
+}
+
+TEST(ModuleBundle, RefusesOtherForms) {
+  EXPECT_THROW(bundle({{"a/main.js", "import x from \"./b.js\";\n"}}), std::logic_error);
+  EXPECT_THROW(bundle({{"a/main.js", "export let x = 1;\n"}}), std::logic_error);
+  EXPECT_THROW(
+      bundle({{"a/main.js", "import \"./b.js\";\n"}, {"a/b.js", "import \"./main.js\";\n"}}),
+      std::logic_error);
+}
+
+TEST(ViewerSite, RefersToNoOtherFile) {
+  const std::vector<query::ViewerFile> site = viewer_site("a <b> & \"c\"");
+  ASSERT_EQ(site.size(), 2u);
+  EXPECT_EQ(site[0].name, query::hashed_name("viewer", site[0].contents, ".js"));
+  EXPECT_EQ(site[1].name, "index.html");
+  const std::string& page = site[1].contents;
+  EXPECT_NE(page.find("<title>a &lt;b&gt; &amp; &quot;c&quot;</title>"), page.npos);
+  EXPECT_NE(page.find("src=\"" + site[0].name + "\""), page.npos);
+  EXPECT_EQ(page.find("=\"/"), page.npos);
+}
+
+}  // namespace
+}  // namespace voxdag::server
