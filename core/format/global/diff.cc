@@ -169,10 +169,17 @@ class Differ {
     if (const auto known = compared_[level].find(pair)) return *known;
     cancel_.check();
     DiffReport total;
-    for (const NodePair& children : children_of(level, pair))
-      total = total + compare(level + 1, children);
+    const std::array<NodePair, 8> below = children_of(level, pair);
+    for (const NodePair& children : below) prefetch(level + 1, children);
+    for (const NodePair& children : below) total = total + compare(level + 1, children);
     compared_[level].insert(pair, total);
     return total;
+  }
+
+  // Prefetches the words of both nodes, so that the cache misses of a node's children overlap.
+  void prefetch(uint32_t level, const NodePair& pair) const {
+    if (pair.a < a_.level(level).word_count) __builtin_prefetch(a_.level(level).words + pair.a);
+    if (pair.b < b_.level(level).word_count) __builtin_prefetch(b_.level(level).words + pair.b);
   }
 
   DiffReport compare_bricks(const NodePair& pair) const {

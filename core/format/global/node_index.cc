@@ -39,16 +39,16 @@ uint64_t NodeIndex::guess_begin(uint64_t span) const {
   return first;
 }
 
-// Walks the nodes of the span from word `begin` and marks in starts_ where they begin.
+// Walks the nodes of the span from word `begin` and marks in words_ where they begin.
 NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   const uint64_t end = std::min(level_.word_count, (span + 1) * kSpanWords);
-  for (uint64_t i = span * kSpanWords / 64; i * 64 < end; ++i) starts_[i] = 0;
+  for (uint64_t i = span * kSpanWords / 64; i * 64 < end; ++i) words_[i].starts = 0;
   Span walked{.begin = begin, .end = begin};
   while (walked.end < end) {
     const uint64_t words = words_of_node(walked.end);
     walked.broken = words == 0;
     if (walked.broken) break;
-    starts_[walked.end / 64] |= uint64_t{1} << walked.end % 64;
+    words_[walked.end / 64].starts |= uint64_t{1} << walked.end % 64;
     ++walked.nodes;
     walked.end += words;
   }
@@ -56,7 +56,7 @@ NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
 }
 
 // Walks spans again until each begins where the previous one ends. Returns the number of nodes of
-// the level. Sets nodes_before_ at the beginning of each span.
+// the level. Sets Words::before at the beginning of each span.
 uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
                          const std::string& where) {
   uint64_t nodes = 0, at = 0;
@@ -70,7 +70,7 @@ uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
       throw Error(ErrorCode::kCorrupt, where + ", word " + std::to_string(at) + ": child mask " +
                                            std::to_string(level_.words[at]) +
                                            ", expected 1 to 255");
-    nodes_before_[span * kSpanWords / 64] = nodes;
+    words_[span * kSpanWords / 64].before = nodes;
     nodes += spans[span].nodes;
   }
   if (at != level_.word_count)
@@ -91,8 +91,7 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsig
     if (level.word_count != 2 * level.node_count) miscounted(level.word_count / 2);
     return;
   }
-  starts_ = PageBuffer<uint64_t>(budget, level.word_count / 64 + 1, "an index of nodes");
-  nodes_before_ = PageBuffer<uint64_t>(budget, level.word_count / 64 + 1, "an index of nodes");
+  words_ = PageBuffer<Words>(budget, level.word_count / 64 + 1, "an index of nodes");
   PageBuffer<Span> spans(budget, span_count(), "an index of nodes");
   parallel_for(threads, spans.size(), [&](unsigned, size_t span) {
     cancel.check();
@@ -102,9 +101,10 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsig
   if (nodes != level.node_count) miscounted(nodes);
   parallel_for(threads, spans.size(), [&](unsigned, size_t span) {
     const uint64_t first = span * kSpanWords / 64;
-    const uint64_t end = std::min(first + kSpanWords / 64, starts_.size());
+    const uint64_t end = std::min(first + kSpanWords / 64, words_.size());
     for (uint64_t i = first + 1; i < end; ++i)
-      nodes_before_[i] = nodes_before_[i - 1] + static_cast<uint64_t>(popcount64(starts_[i - 1]));
+      words_[i].before =
+          words_[i - 1].before + static_cast<uint64_t>(popcount64(words_[i - 1].starts));
   });
 }
 

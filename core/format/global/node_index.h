@@ -6,7 +6,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -14,6 +16,7 @@
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
+#include "core/base/popcount8.h"
 #include "core/format/global/voxdag_reader.h"
 #include "voxdag/cancel_token.h"
 
@@ -39,10 +42,14 @@ class NodeIndex {
   uint64_t find(uint64_t offset) const {
     if (offset >= level_.word_count) return kNone;
     if (pointers_ == Pointers::kNone) return offset % 2 == 0 ? offset / 2 : kNone;
-    const uint64_t bits = starts_[offset / 64], bit = uint64_t{1} << offset % 64;
-    return bits & bit
-               ? nodes_before_[offset / 64] + static_cast<uint64_t>(popcount64(bits & (bit - 1)))
-               : kNone;
+    const auto [starts, before] = words_[offset / 64];
+    const uint64_t bit = uint64_t{1} << offset % 64;
+    return starts & bit ? before + static_cast<uint64_t>(popcount64(starts & (bit - 1))) : kNone;
+  }
+  // Prefetches the memory that find() reads.
+  void prefetch(uint64_t offset) const {
+    if (pointers_ != Pointers::kNone && offset < level_.word_count)
+      __builtin_prefetch(&words_[offset / 64]);
   }
 
   // To visit all nodes of the level, call visit_span() for the spans 0 to span_count() - 1, on any
@@ -56,9 +63,9 @@ class NodeIndex {
       for (uint64_t at = span * kSpanWords; at < end; at += 2) visit(at / 2, at);
       return;
     }
-    uint64_t index = nodes_before_[span * kSpanWords / 64];
+    uint64_t index = words_[span * kSpanWords / 64].before;
     for (uint64_t i = span * kSpanWords / 64; i * 64 < end; ++i)
-      for (uint64_t bits = starts_[i]; bits != 0; bits &= bits - 1)
+      for (uint64_t bits = words_[i].starts; bits != 0; bits &= bits - 1)
         visit(index++, i * 64 + static_cast<uint64_t>(std::countr_zero(bits)));
   }
   // Returns the word offset of the last node that begins before the span. The span must not be the
@@ -68,6 +75,11 @@ class NodeIndex {
  private:
   static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
 
+  // Describes 64 words of the level.
+  struct Words {
+    uint64_t starts = 0;  // one bit per word: set if a node begins there
+    uint64_t before = 0;  // number of nodes that begin before the 64 words
+  };
   struct Span {
     uint64_t begin = 0;  // word offset of its first node
     uint64_t end = 0;    // word offset of the end of its last node
@@ -82,8 +94,49 @@ class NodeIndex {
 
   voxdag_reader::Level level_;
   Pointers pointers_ = Pointers::kNone;
-  PageBuffer<uint64_t> starts_;        // one bit per word: set if a node begins there
-  PageBuffer<uint64_t> nodes_before_;  // one entry per 64 words: nodes before them
+  PageBuffer<Words> words_;
 };
+
+// A node together with the indexes of its children.
+struct NodeWithChildren {
+  uint64_t index = 0;  // index of the node in its level
+  uint64_t at = 0;     // word offset at which the node begins
+  voxdag_reader::Node node;
+  // Indexes of its children in the level below; NodeIndex::kNone if no node begins at a pointer.
+  std::array<uint64_t, 8> children{};
+
+  int child_count() const { return kPopcount8[node.child_mask]; }
+};
+
+// Calls visit(NodeWithChildren) for the nodes of a span of `nodes`, in order. The lookups of the
+// children are random reads of memory. So nodes are processed in batches: the reads of a batch are
+// prefetched, and their cache misses overlap. `below` is the index of the level below.
+// `node_at(offset)` returns the node at a word offset. `prefetch(index)` prefetches the data that
+// visit() needs of a child, given the child's index.
+template <class NodeAt, class Prefetch, class Visit>
+void visit_span_with_children(const NodeIndex& nodes, uint64_t span, const NodeIndex& below,
+                              const NodeAt& node_at, const Prefetch& prefetch, const Visit& visit) {
+  std::array<NodeWithChildren, 64> batch;
+  size_t size = 0;
+  const auto finish_batch = [&] {
+    for (size_t i = 0; i < size; ++i)
+      for (int c = 0; c < batch[i].child_count(); ++c) {
+        const uint64_t child = below.find(batch[i].node.child(c));
+        batch[i].children[static_cast<size_t>(c)] = child;
+        if (child != NodeIndex::kNone) prefetch(child);
+      }
+    for (size_t i = 0; i < size; ++i) visit(batch[i]);
+    size = 0;
+  };
+  nodes.visit_span(span, [&](uint64_t index, uint64_t at) {
+    NodeWithChildren& added = batch[size++];
+    added.index = index;
+    added.at = at;
+    added.node = node_at(at);
+    for (int c = 0; c < added.child_count(); ++c) below.prefetch(added.node.child(c));
+    if (size == batch.size()) finish_batch();
+  });
+  finish_batch();
+}
 
 }  // namespace voxdag

@@ -26,7 +26,6 @@ using namespace global_layout;
 namespace {
 
 constexpr uint64_t kBlocksPerItem = 64;  // 4 MiB
-constexpr uint64_t kNodesPerItem = uint64_t{1} << 16;
 
 // True if `a` is before `b` in the total order of nodes whose hashes are equal.
 bool precedes(const voxdag_reader::Node& a, const voxdag_reader::Node& b) {
@@ -83,9 +82,11 @@ class Verifier {
   void check_level(uint32_t level);
   void check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& hashes);
   uint64_t brick_hash(uint64_t at) const;
-  uint64_t node_hash(uint32_t level, uint64_t at);
-  void check_all_used(uint32_t level) const;
+  uint64_t node_hash(uint32_t level, const NodeWithChildren& parent) const;
+  uint64_t hash_at(uint32_t level, uint64_t at) const;
   void check_counts() const;
+  void count_children(uint32_t level, uint64_t span, const PageBuffer<uint64_t>& times,
+                      PageBuffer<uint64_t>& child_times) const;
 
   Pointers pointers(uint32_t level) const {
     if (level == file_.brick_level()) return Pointers::kNone;
@@ -105,7 +106,6 @@ class Verifier {
   const uint64_t narrow_words_;
   std::vector<NodeIndex> indexes_;  // indexes of the levels checked so far
   PageBuffer<uint64_t> hashes_;     // truncated hashes of the nodes of the level checked last
-  PageBuffer<uint8_t> used_;        // for each node of that level: 1 if a node above refers to it
 };
 
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
@@ -239,22 +239,27 @@ uint64_t Verifier::brick_hash(uint64_t at) const {
   return truncate_hash(hash_brick(file_.brick(at)), file_.hash_bits());
 }
 
-// Returns the hash of the node at word `at`. Also checks its children and marks them as used.
-uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
-  const voxdag_reader::Node parent = node(level, at);
-  const int children = kPopcount8[parent.child_mask];
+// Returns the hash of a node. Throws Error if one of its pointers does not lead to a node.
+uint64_t Verifier::node_hash(uint32_t level, const NodeWithChildren& parent) const {
   uint64_t child_hashes[8];
-  for (int c = 0; c < children; ++c) {
-    const uint64_t child = indexes_[level + 1].find(parent.child(c));
+  for (int c = 0; c < parent.child_count(); ++c) {
+    const uint64_t child = parent.children[static_cast<size_t>(c)];
     if (child == NodeIndex::kNone)
-      broken(where(level, at + 1 + (static_cast<uint64_t>(c) << parent.wide)),
-             "a child at word " + std::to_string(parent.child(c)) + ", where no node of level " +
-                 std::to_string(level + 1) + " begins");
+      broken(where(level, parent.at + 1 + (static_cast<uint64_t>(c) << parent.node.wide)),
+             "a child at word " + std::to_string(parent.node.child(c)) +
+                 ", where no node of level " + std::to_string(level + 1) + " begins");
     child_hashes[c] = hashes_[child];
-    const std::atomic_ref used(used_[child]);
-    if (used.load(std::memory_order_relaxed) == 0) used.store(1, std::memory_order_relaxed);
   }
-  return truncate_hash(hash_node(parent.child_mask, child_hashes), file_.hash_bits());
+  return truncate_hash(hash_node(parent.node.child_mask, parent.child_count(), child_hashes),
+                       file_.hash_bits());
+}
+
+uint64_t Verifier::hash_at(uint32_t level, uint64_t at) const {
+  if (level == file_.brick_level()) return brick_hash(at);
+  NodeWithChildren parent{.at = at, .node = node(level, at)};
+  for (int c = 0; c < parent.child_count(); ++c)
+    parent.children[static_cast<size_t>(c)] = indexes_[level + 1].find(parent.node.child(c));
+  return node_hash(level, parent);
 }
 
 // Computes the hashes of the nodes in a span and checks their order. The first node is compared
@@ -263,14 +268,10 @@ uint64_t Verifier::node_hash(uint32_t level, uint64_t at) {
 void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& hashes) {
   const NodeIndex& index = indexes_[level];
   const bool bricks = level == file_.brick_level();
-  const auto hash_at = [&](uint64_t at) { return bricks ? brick_hash(at) : node_hash(level, at); };
   uint64_t previous = span == 0 ? NodeIndex::kNone : index.last_before(span);
-  uint64_t previous_hash = span == 0 ? 0 : hash_at(previous);
+  uint64_t previous_hash = span == 0 ? 0 : hash_at(level, previous);
   uint64_t nodes = 0;
-  index.visit_span(span, [&](uint64_t i, uint64_t at) {
-    const uint64_t hash = hashes[i] = hash_at(at);
-    if (bricks && file_.brick(at) == 0)
-      broken(where(level, at), "the brick is empty: expected at least one voxel");
+  const auto check_order = [&](uint64_t at, uint64_t hash) {
     const auto in_order = [&] {
       if (hash != previous_hash) return previous_hash < hash;
       return bricks ? file_.brick(previous) < file_.brick(at)
@@ -284,7 +285,20 @@ void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& h
     previous = at;
     previous_hash = hash;
     ++nodes;
-  });
+  };
+  if (bricks)
+    index.visit_span(span, [&](uint64_t i, uint64_t at) {
+      if (file_.brick(at) == 0)
+        broken(where(level, at), "the brick is empty: expected at least one voxel");
+      check_order(at, hashes[i] = brick_hash(at));
+    });
+  else
+    visit_span_with_children(
+        index, span, indexes_[level + 1], [&](uint64_t at) { return node(level, at); },
+        [&](uint64_t child) { __builtin_prefetch(&hashes_[child]); },
+        [&](const NodeWithChildren& parent) {
+          check_order(parent.at, hashes[parent.index] = node_hash(level, parent));
+        });
   cancel_.check();
   progress_.advance(nodes);
 }
@@ -293,26 +307,27 @@ void Verifier::check_level(uint32_t level) {
   const voxdag_reader::Level& nodes = file_.level(level);
   indexes_[level] = NodeIndex(nodes, pointers(level), threads_, budget_, cancel_, where(level));
   PageBuffer<uint64_t> hashes(budget_, nodes.node_count, "hashes of a level");
-  used_ = PageBuffer<uint8_t>(budget_, hashes_.size(), "parents of a level");
   parallel_for(threads_, indexes_[level].span_count(),
                [&](unsigned, size_t span) { check_span(level, span, hashes); });
-  if (level < file_.brick_level()) check_all_used(level + 1);
   hashes_ = std::move(hashes);
 }
 
-void Verifier::check_all_used(uint32_t level) const {
-  parallel_for(threads_, (used_.size() + kNodesPerItem - 1) / kNodesPerItem,
-               [&](unsigned, size_t item) {
-                 const uint64_t end = std::min((item + 1) * kNodesPerItem, used_.size());
-                 for (uint64_t i = item * kNodesPerItem; i < end; ++i)
-                   if (!used_[i])
-                     broken(where(level),
-                            "node " + std::to_string(i) + " has no parent: expected at least one");
-               });
+// Adds the occurrences of the nodes in a span to the occurrences of their children.
+void Verifier::count_children(uint32_t level, uint64_t span, const PageBuffer<uint64_t>& times,
+                              PageBuffer<uint64_t>& child_times) const {
+  visit_span_with_children(
+      indexes_[level], span, indexes_[level + 1], [&](uint64_t at) { return node(level, at); },
+      [&](uint64_t child) { __builtin_prefetch(&child_times[child], 1); },
+      [&](const NodeWithChildren& parent) {
+        for (int c = 0; c < parent.child_count(); ++c)
+          std::atomic_ref(child_times[parent.children[static_cast<size_t>(c)]])
+              .fetch_add(times[parent.index], std::memory_order_relaxed);
+      });
 }
 
 // Checks the numbers of voxels and octree nodes in the header. To compute these numbers, counts the
-// occurrences of each node in the octree, from the root down.
+// occurrences of each node in the octree, from the root down. Throws Error if a node does not
+// occur.
 void Verifier::check_counts() const {
   std::atomic<uint64_t> svo_nodes = 0, voxels = 0;
   PageBuffer<uint64_t> times(budget_, file_.empty() ? 0 : 1, "counts of a level");
@@ -325,16 +340,13 @@ void Verifier::check_counts() const {
       cancel_.check();
       uint64_t span_nodes = 0, span_voxels = 0;
       indexes_[level].visit_span(span, [&](uint64_t i, uint64_t at) {
+        if (times[i] == 0)
+          broken(where(level),
+                 "node " + std::to_string(i) + " has no parent: expected at least one");
         span_nodes += times[i];
-        if (bricks) {
-          span_voxels += times[i] * static_cast<uint64_t>(popcount64(file_.brick(at)));
-          return;
-        }
-        const voxdag_reader::Node parent = node(level, at);
-        for (int c = 0; c < kPopcount8[parent.child_mask]; ++c)
-          std::atomic_ref(child_times[indexes_[level + 1].find(parent.child(c))])
-              .fetch_add(times[i], std::memory_order_relaxed);
+        if (bricks) span_voxels += times[i] * static_cast<uint64_t>(popcount64(file_.brick(at)));
       });
+      if (!bricks) count_children(level, span, times, child_times);
       svo_nodes += span_nodes;
       voxels += span_voxels;
     });
