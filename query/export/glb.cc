@@ -15,6 +15,9 @@
 #include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
+#include "query/export/faces/brick_faces.h"
+#include "query/export/faces/brick_map.h"
+#include "query/export/faces/plane_sort.h"
 #include "query/lookup/bricks.h"
 
 namespace voxdag::query {
@@ -33,18 +36,6 @@ uint64_t max_quads(const ExportJob& job, uint64_t max_bytes) {
   return (max_bytes - kMaxGlbJsonBytes) / quad_bytes(job);
 }
 
-struct GlbBrick {
-  uint64_t morton = 0;  // Morton code of the brick's low corner, in bricks
-  uint64_t mask = 0;
-};
-
-// A cube of at least 8 cells per edge in which all cells are set. Only its bricks at one side are
-// visited when the faces of that side are found.
-struct GlbCube {
-  uint64_t morton = 0;  // Morton code of the low corner, in bricks
-  int64_t edge = 0;     // in cells
-};
-
 // A rectangle of faces perpendicular to `axis`. `plane` is the coordinate of the faces on this
 // axis. The rectangle extends from u0 to u1 on the next axis, and from v0 to v1 on the axis after
 // that; z is followed by x. All coordinates are in cells.
@@ -62,12 +53,11 @@ class GlbSurface {
   GlbSurface(const ExportJob& job, uint64_t max_quads)
       : job_(job), max_quads_(max_quads), colors_(job.file) {
     const Sizes sizes = count_bricks();
-    bricks_charge_ = MemoryCharge(
-        job.budget, sizes.bricks * sizeof(GlbBrick) + sizes.cubes * sizeof(GlbCube), kMemory);
-    bricks_.reserve(sizes.bricks);
-    cubes_.reserve(sizes.cubes);
+    bricks_charge_ = MemoryCharge(job_.budget, BrickMap::bytes(sizes.bricks, sizes.cubes), kMemory);
+    map_.reserve(sizes.bricks, sizes.cubes);
+    outer_bricks_ = sizes.bricks + sizes.side_bricks;
     find_bricks(sizes);
-    ExportStage stage(job, "find faces", 6 * (sizes.bricks + sizes.side_bricks), "bricks");
+    ExportStage stage(job, "find faces", 6 * outer_bricks_, "bricks");
     for (uint8_t axis = 0; axis < 3; ++axis)
       for (const bool upward : {false, true})
         if (quads_.size() <= max_quads_) add_quads(axis, upward, stage);
@@ -79,11 +69,6 @@ class GlbSurface {
  private:
   static constexpr const char* kMemory =
       "the surface (a smaller --region or a coarser --level needs less)";
-  // A face is stored as one number, with 21 bits each for plane, v and u. Faces are sorted by
-  // plane, then v, then u.
-  static constexpr int kCoordinateBits = 21;
-  static constexpr uint64_t kCoordinateMask = (uint64_t{1} << kCoordinateBits) - 1;
-
   struct Sizes {
     uint64_t bricks = 0, cubes = 0;
     uint64_t side_bricks = 0;  // bricks of one side of all cubes
@@ -123,59 +108,38 @@ class GlbSurface {
         job_.dag, job_.selection,
         [&](const Brick& brick) {
           stage.advance(1);
-          bricks_.push_back({brick_morton(brick.low), brick.mask});
+          map_.add(BrickMask{brick_morton(brick.low), brick.mask});
         },
         [&](const Position& low, int64_t edge) {
           stage.advance(1);
-          cubes_.push_back({brick_morton(low), edge});
+          map_.add(FullCube{brick_morton(low), edge});
         });
   }
 
-  uint64_t mask_at(const Position& corner) const {
-    for (const int64_t c : corner)
-      if (c < 0 || c >= int64_t{1} << job_.selection.grid_levels) return 0;
-    const uint64_t morton = brick_morton(corner);
-    const auto found = std::ranges::lower_bound(bricks_, morton, {}, &GlbBrick::morton);
-    if (found != bricks_.end() && found->morton == morton) return found->mask;
-    const auto after = std::ranges::upper_bound(cubes_, morton, {}, &GlbCube::morton);
-    if (after == cubes_.begin()) return 0;
-    const GlbCube& cube = *std::prev(after);
-    return morton - cube.morton < cells_of_cube(cube.edge / kBrickEdge) ? ~uint64_t{0} : 0;
-  }
-
-  // Calls visit(corner, mask) for each brick that can have faces perpendicular to `axis` on its
-  // upper or lower side.
+  // Calls visit(morton, mask, from) for each brick that can have faces perpendicular to `axis` on
+  // its upper or lower side. BrickMap::mask_at() searches for the next brick on that side from
+  // `from`.
   template <class Visit>
   void for_each_outer_brick(uint8_t axis, bool upward, const Visit& visit) const {
-    for (const GlbBrick& brick : bricks_) visit(corner_of(brick.morton), brick.mask);
-    for (const GlbCube& cube : cubes_) {
+    const std::vector<BrickMask>& bricks = map_.bricks();
+    for (size_t i = 0; i < bricks.size(); ++i) visit(bricks[i].morton, bricks[i].mask, i);
+    // Only the bricks at one side of a full cube can have these faces.
+    for (const FullCube& cube : map_.cubes()) {
       Position low = corner_of(cube.morton), at = low;
       if (upward) at[axis] += cube.edge - kBrickEdge;
       const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
       for (at[u] = low[u]; at[u] < low[u] + cube.edge; at[u] += kBrickEdge)
         for (at[v] = low[v]; at[v] < low[v] + cube.edge; at[v] += kBrickEdge)
-          visit(at, ~uint64_t{0});
+          visit(brick_morton(at), ~uint64_t{0}, upward ? 0 : bricks.size());
     }
   }
 
-  // Returns the mask of a brick's cells that have a face on the surface: a face perpendicular to
-  // `axis`, on the cell's upper side if `upward` is true, otherwise on its lower side.
-  uint64_t exposed(const Position& corner, uint64_t mask, uint8_t axis, bool upward) const {
-    Position next_to = corner;
-    next_to[axis] += upward ? kBrickEdge : -kBrickEdge;
-    const uint64_t neighbor = mask_at(next_to);
-    uint64_t faces = 0;
-    for (uint64_t rest = mask; rest != 0; rest &= rest - 1) {
-      const int bit = std::countr_zero(rest);
-      std::array<int, 3> at = {brick_coordinate(bit, 0), brick_coordinate(bit, 1),
-                               brick_coordinate(bit, 2)};
-      at[axis] += upward ? 1 : -1;
-      const bool inside = at[axis] >= 0 && at[axis] < kBrickEdge;
-      at[axis] &= kBrickEdge - 1;
-      if (!((inside ? mask : neighbor) >> brick_bit(at[0], at[1], at[2]) & 1))
-        faces |= uint64_t{1} << bit;
-    }
-    return faces;
+  // Returns the mask of a brick's cells that have a face on the surface; see faces_of_brick().
+  uint64_t exposed(uint64_t morton, uint64_t mask, size_t from, uint8_t axis, bool upward) const {
+    uint64_t neighbor = 0;
+    if (mask & side_cells(axis, upward))
+      neighbor = map_.mask_at(BrickMap::next_morton(morton, axis, upward), from, upward);
+    return faces_of_brick(mask, neighbor, axis, upward);
   }
 
   static Position corner_of(uint64_t morton) {
@@ -185,43 +149,55 @@ class GlbSurface {
   }
 
   void add_quads(uint8_t axis, bool upward, ExportStage& stage) {
-    uint64_t count = 0;
-    for_each_outer_brick(axis, upward, [&](const Position& corner, uint64_t mask) {
-      count += static_cast<uint64_t>(std::popcount(exposed(corner, mask, axis, upward)));
+    const uint64_t planes = (uint64_t{1} << job_.selection.grid_levels) + kBrickEdge + 1;
+    PlaneSort faces(job_.budget, planes, kMemory);
+    const MemoryCharge charge(job_.budget, outer_bricks_ * sizeof(uint64_t), kMemory);
+    std::vector<uint64_t> masks;  // exposed() for each outer brick
+    masks.reserve(outer_bricks_);
+    for_each_outer_brick(axis, upward, [&](uint64_t morton, uint64_t mask, size_t from) {
+      const uint64_t found = masks.emplace_back(exposed(morton, mask, from, axis, upward));
       stage.advance(1);
+      if (found == 0) return;
+      const auto plane = static_cast<uint64_t>(corner_of(morton)[axis] + upward);
+      for (size_t i = 0; i < kBrickEdge; ++i)
+        faces.count(plane + i, static_cast<uint64_t>(std::popcount(found & kBrickLayers[axis][i])));
     });
-    const MemoryCharge charge(job_.budget, count * sizeof(uint64_t), kMemory);
-    std::vector<uint64_t> faces;
-    faces.reserve(count);
-    const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
-    for_each_outer_brick(axis, upward, [&](const Position& corner, uint64_t mask) {
-      for_each_cell_of({corner, exposed(corner, mask, axis, upward)}, [&](const Position& cell) {
-        const auto part = [&](size_t a, int64_t more = 0) {
-          return static_cast<uint64_t>(cell[a] - job_.selection.region.low[a] + more);
-        };
-        faces.push_back((part(axis, upward) << kCoordinateBits | part(v)) << kCoordinateBits |
-                        part(u));
-      });
+    faces.reserve();
+    size_t next = 0;
+    for_each_outer_brick(axis, upward, [&](uint64_t morton, uint64_t, size_t) {
+      if (const uint64_t found = masks[next++]; found != 0)
+        add_faces({corner_of(morton), found}, axis, upward, faces);
     });
-    std::ranges::sort(faces);
     job_.cancel.check();
-    merge(faces, axis, upward);
+    merge(faces.sort(), axis, upward);
+  }
+
+  void add_faces(const Brick& brick, uint8_t axis, bool upward, PlaneSort& faces) const {
+    const size_t u = (axis + 1u) % 3, v = (axis + 2u) % 3;
+    const Position& low = job_.selection.region.low;
+    for_each_cell_of(brick, [&](const Position& cell) {
+      faces.add(static_cast<uint64_t>(cell[axis] + upward),
+                face_of(static_cast<uint64_t>(cell[axis] - low[axis] + upward),
+                        static_cast<uint64_t>(cell[v] - low[v]),
+                        static_cast<uint64_t>(cell[u] - low[u])));
+    });
   }
 
   // Returns the color of the cell to which a face belongs; black if the job has no colors.
   voxdag_reader::Rgb color_of(uint64_t face, uint8_t axis, bool upward) {
     if (!job_.has_colors) return {};
     std::array<int64_t, 3> cell = job_.selection.region.low;
-    cell[(axis + 1u) % 3] += static_cast<int64_t>(face & kCoordinateMask);
-    cell[(axis + 2u) % 3] += static_cast<int64_t>(face >> kCoordinateBits & kCoordinateMask);
-    cell[axis] += static_cast<int64_t>(face >> 2 * kCoordinateBits) - upward;
+    cell[(axis + 1u) % 3] += static_cast<int64_t>(face & kFaceCoordinateMask);
+    cell[(axis + 2u) % 3] +=
+        static_cast<int64_t>(face >> kFaceCoordinateBits & kFaceCoordinateMask);
+    cell[axis] += static_cast<int64_t>(face >> 2 * kFaceCoordinateBits) - upward;
     return color_of_cell(job_, colors_, cell);
   }
 
   // Makes rectangles of sorted faces. Divides each row, which is the faces of one plane and one v,
   // into the longest runs of one color. If the previous row has a run with the same color, u0 and
   // u1, the run extends that run's rectangle; otherwise it begins a new rectangle.
-  void merge(const std::vector<uint64_t>& faces, uint8_t axis, bool upward) {
+  void merge(std::span<const uint64_t> faces, uint8_t axis, bool upward) {
     std::vector<size_t> row, previous;  // rectangles of the current row and of the previous row
     size_t candidate = 0;
     GlbQuad last{};
@@ -238,11 +214,11 @@ class GlbSurface {
       }
       run.axis = axis;
       run.upward = upward;
-      run.u0 = static_cast<uint32_t>(faces[i] & kCoordinateMask);
+      run.u0 = static_cast<uint32_t>(faces[i] & kFaceCoordinateMask);
       run.u1 = run.u0 + static_cast<uint32_t>(end - i);
-      run.v0 = static_cast<uint32_t>(faces[i] >> kCoordinateBits & kCoordinateMask);
+      run.v0 = static_cast<uint32_t>(faces[i] >> kFaceCoordinateBits & kFaceCoordinateMask);
       run.v1 = run.v0 + 1;
-      run.plane = static_cast<uint32_t>(faces[i] >> 2 * kCoordinateBits);
+      run.plane = static_cast<uint32_t>(faces[i] >> 2 * kFaceCoordinateBits);
       i = end;
       if (run.plane != last.plane || run.v0 != last.v0) {
         previous.clear();
@@ -278,8 +254,8 @@ class GlbSurface {
   const uint64_t max_quads_;
   voxdag_reader::ColorCursor colors_;
   MemoryCharge bricks_charge_, quads_charge_;
-  std::vector<GlbBrick> bricks_;
-  std::vector<GlbCube> cubes_;
+  BrickMap map_;
+  uint64_t outer_bricks_ = 0;  // calls of for_each_outer_brick()'s visitor
   std::vector<GlbQuad> quads_;
   uint64_t voxels_ = 0;
 };

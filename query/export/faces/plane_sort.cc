@@ -1,0 +1,77 @@
+#include "query/export/faces/plane_sort.h"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace voxdag::query {
+namespace {
+
+// std::sort is faster for fewer faces.
+constexpr size_t kFewFaces = 1024;
+constexpr int kDigitBits = 11;
+
+struct Digit {
+  int shift, bits;
+};
+// The digits of a face within its plane, lowest first: two of u and two of v.
+constexpr std::array<Digit, 4> kDigits = {
+    {{0, kDigitBits},
+     {kDigitBits, kFaceCoordinateBits - kDigitBits},
+     {kFaceCoordinateBits, kDigitBits},
+     {kFaceCoordinateBits + kDigitBits, kFaceCoordinateBits - kDigitBits}}};
+
+// Copies the faces to `to` in the order of one digit. Faces with equal digits keep their order.
+void sort_by_digit(std::span<const uint64_t> from, std::span<uint64_t> to, Digit digit) {
+  const auto of = [digit](uint64_t face) {
+    return face >> digit.shift & ((uint64_t{1} << digit.bits) - 1);
+  };
+  std::array<uint64_t, size_t{1} << kDigitBits> next{};
+  for (const uint64_t face : from) ++next[of(face)];
+  uint64_t sum = 0;
+  for (uint64_t& at : next) sum += std::exchange(at, sum);
+  for (const uint64_t face : from) to[next[of(face)]++] = face;
+}
+
+void sort_plane(std::span<uint64_t> faces, std::span<uint64_t> scratch) {
+  if (faces.size() < kFewFaces) {
+    std::ranges::sort(faces);
+    return;
+  }
+  uint64_t varying = 0;
+  for (const uint64_t face : faces) varying |= face ^ faces[0];
+  std::span<uint64_t> from = faces, to = scratch;
+  for (const Digit digit : kDigits) {
+    if ((varying >> digit.shift & ((uint64_t{1} << digit.bits) - 1)) == 0) continue;
+    sort_by_digit(from, to, digit);
+    std::swap(from, to);
+  }
+  if (from.data() != faces.data()) std::ranges::copy(from, faces.begin());
+}
+
+}  // namespace
+
+PlaneSort::PlaneSort(MemoryBudget& budget, uint64_t planes, const char* what)
+    : budget_(budget),
+      what_(what),
+      ends_charge_(budget, (planes + 1) * sizeof(uint64_t), what),
+      ends_(planes + 1) {}
+
+void PlaneSort::reserve() {
+  const uint64_t most = *std::ranges::max_element(ends_);
+  for (size_t plane = 1; plane < ends_.size(); ++plane) ends_[plane] += ends_[plane - 1];
+  faces_ = PageBuffer<uint64_t>(budget_, ends_.back(), what_);
+  scratch_ = PageBuffer<uint64_t>(budget_, most, what_);
+}
+
+std::span<const uint64_t> PlaneSort::sort() {
+  uint64_t begin = 0;
+  for (const uint64_t end : ends_) {
+    const uint64_t faces = end - std::min(begin, end);
+    if (faces > 1) sort_plane({&faces_[begin], faces}, {scratch_.data(), faces});
+    begin = std::max(begin, end);
+  }
+  return {faces_.data(), faces_.size()};
+}
+
+}  // namespace voxdag::query
