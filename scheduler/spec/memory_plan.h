@@ -25,7 +25,7 @@
 //                     each table of the plane memo  1/16 of the share,           BackendMemory
 //                                                     at most 1/8 of free
 //                     block memo                    1/16 of free                 BackendMemory
-//                     more retained pages           1/8, up to 128 MiB           nobody
+//                     more retained pages           1/8, up to 512 MiB           nobody
 //                     cache key, before build()     7/8 of the share             ArtifactCache
 //   enclose       kept labels of parts              kept_label_bytes()           SpaceLabels
 //                 WorkerMemory, for every worker    7/8 of the rest / workers

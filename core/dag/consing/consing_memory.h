@@ -15,7 +15,7 @@ struct ConsingMemory {
   // can be exceeded by kMinPageBytes; the division of the memory among workers allows for this
   // (scheduler/spec/memory_plan.h).
   static constexpr uint64_t kMinPageBytes = uint64_t{8} << 20;
-  static constexpr uint64_t kMaxPageBytes = uint64_t{128} << 20;
+  static constexpr uint64_t kMaxPageBytes = uint64_t{512} << 20;
   static constexpr uint64_t page_bytes(uint64_t budget_bytes) {
     return std::clamp(budget_bytes / 8, kMinPageBytes, kMaxPageBytes);
   }

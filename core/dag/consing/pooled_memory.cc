@@ -12,6 +12,7 @@ namespace {
 
 constexpr char kWhat[] = "a subvolume";
 constexpr size_t kPage = size_t{4} << 10;
+constexpr size_t kHugePage = size_t{2} << 20;
 constexpr size_t kLargestPower = size_t{4} << 20;
 // Maximum number of cached ranges. The build of a subvolume uses up to a few hundred arrays. With a
 // lower limit, the small ranges, which are freed last, would evict the large ranges.
@@ -21,7 +22,7 @@ constexpr size_t kMaxRanges = 1024;
 
 size_t PagePool::range_bytes(size_t bytes) {
   if (bytes <= kLargestPower) return std::max(std::bit_ceil(bytes), kPage);
-  return (bytes + kPage - 1) / kPage * kPage;
+  return (bytes + kHugePage - 1) / kHugePage * kHugePage;
 }
 
 PagePool::Pages PagePool::take(size_t bytes, size_t max_bytes) {

@@ -27,7 +27,8 @@ class PagePool {
   ~PagePool() { clear(); }
 
   // Returns the size of a new page range for `bytes`: a power of two up to 4 MiB, and a multiple of
-  // the page size above 4 MiB.
+  // 2 MiB, the size of a huge page, above 4 MiB. The system aligns only such ranges to huge pages,
+  // and can only move them without dividing their huge pages.
   static size_t range_bytes(size_t bytes);
   // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes. Returns a range
   // with null data if no range fits.

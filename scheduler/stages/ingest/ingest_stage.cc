@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "core/backend/backend.h"
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "scene/formats/formats.h"
@@ -22,10 +23,18 @@ namespace {
 // Maximum expected bricks per subvolume. Building that many takes a fraction of a second, and their
 // tables fit in the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
+// The same for flat subvolumes (SubvolumeLimits), which take 3 to 16 ns per expected brick. Larger
+// subvolumes have fewer nodes in common, so there are fewer rows to merge.
+constexpr double kMaxBricksPerFlatSubvolume = 128e6;
+// A flat subvolume usually needs less memory per expected brick than this. If it needs more than a
+// worker has, it is split.
+constexpr double kBytesPerFlatBrick = 16;
 // A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
 // kMinBricksPerSubvolume expected bricks.
 constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
+// Minimum number of flat subvolumes per thread, so that the threads finish at about the same time.
+constexpr double kMinSubvolumesPerThread = 16;
 // Maximum wait until the file times of the scene can be trusted.
 constexpr int64_t kMaxWaitNs = 200'000'000;
 // Maximum number of bins. With more bins, each bin's buffer would be too small. Large subvolumes
@@ -43,6 +52,27 @@ int64_t longest_edge(const BuildSpec& spec) {
   return edge;
 }
 
+// True if the build certainly uses the CPU backend of this process. A GPU has less memory than the
+// host, and the tasks of a cluster have less than `run` says.
+bool builds_on_this_cpu(const BuildSpec& spec) {
+  const RunOptions& run = spec.run;
+  if (run.cluster) return false;
+  return run.backend == BackendName::kCpu ||
+         (run.backend == BackendName::kAuto && !cuda_device_available());
+}
+
+// Returns the maximum weight of flat subvolumes: the maximum that leaves enough subvolumes for
+// every thread and whose tables fit in half of a worker's share. Returns 0 if flat subvolumes have
+// no separate maximum.
+double max_flat_weight(const BuildSpec& spec, double total_weight) {
+  if (!builds_on_this_cpu(spec)) return 0;
+  const RunOptions& run = spec.run;
+  const double subvolumes = std::max(kMinSubvolumes, kMinSubvolumesPerThread * run.threads);
+  const WorkerMemory memory = WorkerMemory::divide(run.memory_bytes / 2, run.threads);
+  return std::min({kMaxBricksPerFlatSubvolume, total_weight / subvolumes,
+                   static_cast<double>(memory.share_bytes / 2) / kBytesPerFlatBrick});
+}
+
 std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const BuildSpec& spec) {
   const RunOptions& options = spec.run;
   int64_t longest = longest_edge(spec);
@@ -52,12 +82,15 @@ std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const BuildSpec
     while (plan.size() > kMaxBins) plan = top.subvolumes_by_edge(edge *= 2);
     return plan;
   }
-  double max_weight = std::clamp(top.total_weight() / kMinSubvolumes, kMinBricksPerSubvolume,
-                                 kMaxBricksPerSubvolume);
-  auto plan = top.subvolumes_by_weight(max_weight, longest);
+  SubvolumeLimits limits{.weight = std::clamp(top.total_weight() / kMinSubvolumes,
+                                              kMinBricksPerSubvolume, kMaxBricksPerSubvolume),
+                         .flat_weight = max_flat_weight(spec, top.total_weight()),
+                         .edge = longest};
+  auto plan = top.subvolumes_by_weight(limits);
   while (plan.size() > kMaxBins) {
-    if (longest <= kMaxOptionEdge) longest *= 2;
-    plan = top.subvolumes_by_weight(max_weight *= 2, longest);
+    if (limits.edge <= kMaxOptionEdge) limits.edge *= 2;
+    limits.weight *= 2;
+    plan = top.subvolumes_by_weight(limits);
   }
   return plan;
 }

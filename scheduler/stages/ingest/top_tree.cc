@@ -186,14 +186,11 @@ SubvolumePlan TopTree::gather(const Cube& cube, uint64_t code, const IsSmallEnou
   return whole;
 }
 
-std::vector<SubvolumePlan> TopTree::subvolumes_by_weight(double max_weight,
-                                                         int64_t max_edge) const {
+std::vector<SubvolumePlan> TopTree::subvolumes_by_weight(const SubvolumeLimits& limits) const {
   std::vector<SubvolumePlan> out;
   gather(
       {}, 0,
-      [&](const SubvolumePlan& s) {
-        return s.weight <= max_weight && s.cube.edge_voxels(grid_levels_) <= max_edge;
-      },
+      [&](const SubvolumePlan& s) { return limits.allow(s, s.cube.edge_voxels(grid_levels_)); },
       out);
   return out;
 }

@@ -3,6 +3,7 @@
 // become subvolumes. Threads fill separate tallies, which are added to the tree one after another.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -31,6 +32,22 @@ struct SubvolumePlan {
   Cube cube;
   double weight = 0;       // expected bricks; a triangle's are divided among the cells it touches
   uint64_t triangles = 0;  // upper bound of the triangles that touch the cube
+};
+
+// Maximum weight and edge of subvolumes.
+struct SubvolumeLimits {
+  // Minimum average weight of the triangles of a *flat* subvolume. So large triangles have many
+  // equal nodes: the tables of a flat subvolume are small for its weight.
+  static constexpr double kFlatTriangleBricks = 256;
+
+  double weight = 0;
+  double flat_weight = 0;  // maximum weight of flat subvolumes, if larger than `weight`
+  int64_t edge = INT64_MAX;
+
+  bool allow(const SubvolumePlan& s, int64_t edge_voxels) const {
+    const bool is_flat = s.weight >= kFlatTriangleBricks * static_cast<double>(s.triangles);
+    return edge_voxels <= edge && s.weight <= (is_flat ? std::max(weight, flat_weight) : weight);
+  }
 };
 
 class TopTree {
@@ -93,10 +110,9 @@ class TopTree {
   }
   uint64_t occupied_cells() const;
 
-  // Returns the largest occupied cubes of weight <= `max_weight` and of an edge <= `max_edge`, in
-  // Morton order. Includes single cells that exceed a limit, which cannot be divided.
-  std::vector<SubvolumePlan> subvolumes_by_weight(double max_weight,
-                                                  int64_t max_edge = INT64_MAX) const;
+  // Returns the largest occupied cubes within the limits, in Morton order. Includes single cells
+  // that exceed a limit, which cannot be divided.
+  std::vector<SubvolumePlan> subvolumes_by_weight(const SubvolumeLimits& limits) const;
   // Returns the occupied cubes of this edge (or of the cells' edge if that is larger), in Morton
   // order.
   std::vector<SubvolumePlan> subvolumes_by_edge(int64_t edge_voxels) const;

@@ -30,14 +30,14 @@ TEST_F(PooledMemoryTest, CachedPagesAreZeroedAgain) {
 // Cached pages are freed if the budget cannot hold both them and an allocation. They take at most
 // an eighth of a large budget.
 TEST_F(PooledMemoryTest, CachedPagesStayWithinTheBudget) {
-  { const PooledArray<uint8_t> used(memory_, 7 << 20); }
-  EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
+  { const PooledArray<uint8_t> used(memory_, 8 << 20); }
+  EXPECT_EQ(pool_.cached_bytes(), 8u << 20);
   { const PooledArray<uint8_t> more(memory_, 16 << 20); }
-  EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
+  EXPECT_EQ(pool_.cached_bytes(), 8u << 20);
   {
     const PooledArray<uint8_t> again(memory_, 5 << 20);
-    EXPECT_EQ(again.size(), 7u << 20);
-    EXPECT_EQ(budget_.used(), 7u << 20);
+    EXPECT_EQ(again.size(), 8u << 20);
+    EXPECT_EQ(budget_.used(), 8u << 20);
     EXPECT_EQ(pool_.cached_bytes(), 0u);
   }
   const PooledArray<uint8_t> most(memory_, 60 << 20);
@@ -49,15 +49,23 @@ TEST_F(PooledMemoryTest, NewPagesEvictOldOnes) {
   for (const size_t mib : {5u, 2u}) {
     const PooledArray<uint8_t> used(memory_, mib << 20);
   }
-  EXPECT_EQ(pool_.cached_bytes(), 7u << 20);
+  EXPECT_EQ(pool_.cached_bytes(), 8u << 20);
   { const PooledArray<uint8_t> zeroed(memory_, 4 << 20, PooledArray<uint8_t>::kZero); }
   EXPECT_EQ(pool_.cached_bytes(), 6u << 20);
   EXPECT_EQ(pool_.take(5 << 20, 5 << 20).data, nullptr);
 }
 
+// Large ranges are multiples of huge pages. Only such ranges keep their huge pages when they grow.
+TEST_F(PooledMemoryTest, LargeRangesAreMultiplesOfHugePages) {
+  EXPECT_EQ(PagePool::range_bytes(1), 4096u);
+  EXPECT_EQ(PagePool::range_bytes((4 << 20) - 1), 4u << 20);
+  EXPECT_EQ(PagePool::range_bytes((4 << 20) + 1), 6u << 20);
+  EXPECT_EQ(PagePool::range_bytes(6 << 20), 6u << 20);
+}
+
 // A zeroed array has exactly the requested size: the hash tables rely on that.
 TEST_F(PooledMemoryTest, ZeroedArraysAreExact) {
-  { const PooledArray<uint8_t> used(memory_, 7 << 20); }
+  { const PooledArray<uint8_t> used(memory_, 8 << 20); }
   const PooledArray<uint8_t> table(memory_, 4 << 20, PooledArray<uint8_t>::kZero);
   EXPECT_EQ(table.size(), 4u << 20);
 }

@@ -95,7 +95,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
     for (const FixedTriangle& t : triangles) add(top, t);
     for (const auto& leaves :
          {top.subvolumes_by_edge(256), top.subvolumes_by_edge(64), top.subvolumes_by_edge(2048),
-          top.subvolumes_by_weight(top.total_weight() / 20)}) {
+          top.subvolumes_by_weight({.weight = top.total_weight() / 20})}) {
       SCOPED_TRACE(testing::Message() << "size " << size << ", leaves " << leaves.size());
       std::vector<Cube> cubes;
       for (const SubvolumePlan& leaf : leaves) cubes.push_back(leaf.cube);
@@ -189,7 +189,7 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   TopTree top(kLevels, budget, depth);
   for (int i = 0; i < 2000; ++i) add(top, triangle_near(random, 5000));
   const double most = top.total_weight() / 100;
-  const auto plan = top.subvolumes_by_weight(most);
+  const auto plan = top.subvolumes_by_weight({.weight = most});
   EXPECT_GT(plan.size(), 100u);
   double sum = 0;
   for (size_t i = 0; i < plan.size(); ++i) {
@@ -204,6 +204,23 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
     }
   }
   EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
+}
+
+// Cubes of large triangles may have more weight than the other cubes.
+TEST(TopTree, FlatSubvolumesHaveASeparateLimit) {
+  MemoryBudget budget(uint64_t{1} << 30);
+  constexpr int64_t kGrid = int64_t{kUnitsPerVoxel} << kLevels;
+  TopTree large(kLevels, budget, 2), small(kLevels, budget, 2);
+  add(large, {{{1, 1, 1}, {kGrid - 1, 1, 1}, {1, kGrid - 1, 1}}});
+  std::mt19937_64 random(5);
+  for (int i = 0; i < 2000; ++i) add(small, triangle_near(random, 5000));
+  for (const TopTree* top : {&large, &small}) {
+    const double most = top->total_weight() / 8;
+    const auto plan = top->subvolumes_by_weight({.weight = most});
+    const auto flat = top->subvolumes_by_weight({.weight = most, .flat_weight = 4 * most});
+    EXPECT_EQ(flat.size() < plan.size(), top == &large);
+    for (const SubvolumePlan& s : flat) EXPECT_LE(s.weight, 4 * most);
+  }
 }
 
 // The expected number of voxels of a triangle is the volume of its Minkowski sum with a voxel. For
@@ -256,8 +273,8 @@ TEST(TopTree, ContinuesFromTheCellsOfAnother) {
     add(i < 700 ? first : rest, triangle);
   }
   EXPECT_EQ(rest.total_weight(), whole.total_weight());
-  const auto plan = whole.subvolumes_by_weight(whole.total_weight() / 50);
-  const auto again = rest.subvolumes_by_weight(whole.total_weight() / 50);
+  const auto plan = whole.subvolumes_by_weight({.weight = whole.total_weight() / 50});
+  const auto again = rest.subvolumes_by_weight({.weight = whole.total_weight() / 50});
   ASSERT_EQ(plan.size(), again.size());
   for (size_t i = 0; i < plan.size(); ++i) {
     EXPECT_EQ(plan[i].cube, again[i].cube);
