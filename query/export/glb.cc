@@ -160,7 +160,8 @@ class GlbSurface {
       if (found == 0) return;
       const auto plane = static_cast<uint64_t>(corner_of(morton)[axis] + upward);
       for (size_t i = 0; i < kBrickEdge; ++i)
-        faces.count(plane + i, static_cast<uint64_t>(std::popcount(found & kBrickLayers[axis][i])));
+        faces.count(plane + i,
+                    static_cast<uint64_t>(std::popcount(found & kBrickLayers.of[axis][i])));
     });
     faces.reserve();
     size_t next = 0;

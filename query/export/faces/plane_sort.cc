@@ -9,31 +9,31 @@ namespace {
 
 // std::sort is faster for fewer faces.
 constexpr size_t kFewFaces = 1024;
-constexpr int kDigitBits = 11;
+constexpr int kFaceDigitBits = 11;
 
-struct Digit {
+struct FaceDigit {
   int shift, bits;
 };
 // The digits of a face within its plane, lowest first: two of u and two of v.
-constexpr std::array<Digit, 4> kDigits = {
-    {{0, kDigitBits},
-     {kDigitBits, kFaceCoordinateBits - kDigitBits},
-     {kFaceCoordinateBits, kDigitBits},
-     {kFaceCoordinateBits + kDigitBits, kFaceCoordinateBits - kDigitBits}}};
+constexpr std::array<FaceDigit, 4> kFaceDigits = {
+    {{0, kFaceDigitBits},
+     {kFaceDigitBits, kFaceCoordinateBits - kFaceDigitBits},
+     {kFaceCoordinateBits, kFaceDigitBits},
+     {kFaceCoordinateBits + kFaceDigitBits, kFaceCoordinateBits - kFaceDigitBits}}};
 
 // Copies the faces to `to` in the order of one digit. Faces with equal digits keep their order.
-void sort_by_digit(std::span<const uint64_t> from, std::span<uint64_t> to, Digit digit) {
+void sort_faces_by_digit(std::span<const uint64_t> from, std::span<uint64_t> to, FaceDigit digit) {
   const auto of = [digit](uint64_t face) {
     return face >> digit.shift & ((uint64_t{1} << digit.bits) - 1);
   };
-  std::array<uint64_t, size_t{1} << kDigitBits> next{};
+  std::array<uint64_t, size_t{1} << kFaceDigitBits> next{};
   for (const uint64_t face : from) ++next[of(face)];
   uint64_t sum = 0;
   for (uint64_t& at : next) sum += std::exchange(at, sum);
   for (const uint64_t face : from) to[next[of(face)]++] = face;
 }
 
-void sort_plane(std::span<uint64_t> faces, std::span<uint64_t> scratch) {
+void sort_faces_of_plane(std::span<uint64_t> faces, std::span<uint64_t> scratch) {
   if (faces.size() < kFewFaces) {
     std::ranges::sort(faces);
     return;
@@ -41,9 +41,9 @@ void sort_plane(std::span<uint64_t> faces, std::span<uint64_t> scratch) {
   uint64_t varying = 0;
   for (const uint64_t face : faces) varying |= face ^ faces[0];
   std::span<uint64_t> from = faces, to = scratch;
-  for (const Digit digit : kDigits) {
+  for (const FaceDigit digit : kFaceDigits) {
     if ((varying >> digit.shift & ((uint64_t{1} << digit.bits) - 1)) == 0) continue;
-    sort_by_digit(from, to, digit);
+    sort_faces_by_digit(from, to, digit);
     std::swap(from, to);
   }
   if (from.data() != faces.data()) std::ranges::copy(from, faces.begin());
@@ -68,7 +68,7 @@ std::span<const uint64_t> PlaneSort::sort() {
   uint64_t begin = 0;
   for (const uint64_t end : ends_) {
     const uint64_t faces = end - std::min(begin, end);
-    if (faces > 1) sort_plane({&faces_[begin], faces}, {scratch_.data(), faces});
+    if (faces > 1) sort_faces_of_plane({&faces_[begin], faces}, {scratch_.data(), faces});
     begin = std::max(begin, end);
   }
   return {faces_.data(), faces_.size()};
