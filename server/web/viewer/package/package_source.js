@@ -138,16 +138,26 @@ export class PackageSource {
       const known = this.blocks.get(block);
       this.blocks.delete(block);
       if (known) this.blocks.set(block, known);
-      else wanted.push(block);
+      else wanted.push(this.begin(block));
     }
-    const places = await Promise.all(wanted.map(async (block) => {
-      const {value, error} = await outcomeOf(this.directory.place(block, options));
-      return {block, error, ...value};
+    const places = await Promise.all(wanted.map(async (request) => {
+      const {value, error} = await outcomeOf(this.directory.place(request.block, options));
+      if (error) request.reject(error);
+      return {...request, ...value, error};
     }));
-    for (const {block, error} of places)
-      if (error) this.keep(block, Promise.reject(error));
-    const placed = places.filter(({error}) => !error);
-    for (const group of merged(placed)) this.fetchGroup(group, options);
+    for (const group of merged(places.filter(({error}) => !error))) this.fetchGroup(group, options);
+  }
+
+  // Stores a promise of a block immediately, so that concurrent calls do not fetch the block again.
+  // Returns {block, resolve, reject}.
+  begin(block) {
+    const request = {block};
+    const loads = new Promise((resolve, reject) => Object.assign(request, {resolve, reject}));
+    this.blocks.set(block, loads);
+    loads.then((decoded) => loads.byteSize = decoded.byteSize, () => {
+      if (this.blocks.get(block) === loads) this.blocks.delete(block);
+    });
+    return request;
   }
 
   fetchGroup(group, options) {
@@ -158,7 +168,7 @@ export class PackageSource {
     for (const each of group) {
       const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
       const decode = (bytes) => this.decode(each.block, part(bytes), bytes.isRange);
-      this.keep(each.block, reads.then(decode).catch((error) => {
+      each.resolve(reads.then(decode).catch((error) => {
         // Without an intact range so far, the server may send wrong ranges.
         if (error.status !== 200 || this.files.rangesAreProven || !this.files.hasRanges)
           throw error;
@@ -189,13 +199,6 @@ export class PackageSource {
     const first = (block - firstBlocks[band]) * kBlockTiles;
     return new TileBlock(
         plain, level, tileShape(this.info, level), Math.min(kBlockTiles, tiles - first));
-  }
-
-  keep(block, loads) {
-    this.blocks.set(block, loads);
-    loads.then((decoded) => loads.byteSize = decoded.byteSize, () => {
-      if (this.blocks.get(block) === loads) this.blocks.delete(block);
-    });
   }
 
   // Forgets the least recently used blocks. Blocks that are being loaded have no size yet.

@@ -1,0 +1,122 @@
+"""Packages of `voxdag publish`, on servers that answer requests for ranges in different ways."""
+
+import contextlib
+import gzip
+import re
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+from picture_checks import HEIGHT, MIN_EQUAL_DEPTH, PLAIN, WIDTH, assert_equal, compare
+
+# How a server answers a request for a range.
+#   ranges:     with the range
+#   whole:      with the complete file, like `python -m http.server`
+#   compressed: with a range of the compressed file, like some content delivery networks
+#   refused:    with an error
+HOSTS = ["ranges", "whole", "compressed", "refused"]
+CHECKED_HOSTS = ["ranges", "compressed"]  # to save time
+RANGE = re.compile(r"bytes=(\d+)-(\d+)$")
+
+
+class Handler(SimpleHTTPRequestHandler):
+    """Serves a folder below /scenes/one/. `host` is one of HOSTS."""
+
+    protocol_version = "HTTP/1.1"
+
+    def __init__(self, *arguments, host, **options):
+        self.host = host
+        super().__init__(*arguments, **options)
+
+    def log_message(self, *_):
+        pass
+
+    def translate_path(self, path):
+        return super().translate_path(path.removeprefix("/scenes/one"))
+
+    def end_headers(self):
+        self.send_header("Access-Control-Allow-Origin", "*")
+        self.send_header("Cache-Control", "no-store")
+        super().end_headers()
+
+    def do_GET(self):
+        wanted = RANGE.match(self.headers.get("Range", ""))
+        if not wanted or self.host == "whole":
+            return super().do_GET()
+        if self.host == "refused":
+            return self.send_error(416)
+        try:
+            with open(self.translate_path(self.path.split("?")[0]), "rb") as file:
+                contents = file.read()
+        except OSError:
+            return self.send_error(404)
+        if self.host == "compressed":
+            contents = gzip.compress(contents, 1)
+        begin, end = int(wanted[1]), min(int(wanted[2]) + 1, len(contents))
+        self.send_response(206)
+        self.send_header("Content-Range", f"bytes {begin}-{end - 1}/{len(contents)}")
+        self.send_header("Content-Length", str(max(0, end - begin)))
+        self.end_headers()
+        self.wfile.write(contents[begin:end])
+        return None
+
+
+@contextlib.contextmanager
+def serve(folder, host):
+    """Yields the URL of a server of a package's folder."""
+    server = ThreadingHTTPServer(
+        ("127.0.0.1", 0), partial(Handler, directory=str(folder), host=host)
+    )
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/scenes/one"
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def check_host(visitor, url, host, camera, reference):
+    """The picture is the same from every server, and the page requests no range in vain."""
+    ranges = []
+    visitor.page.on("request", lambda request: ranges.append(request.headers.get("range")))
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.show(camera)
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert_equal(reference, depths, camera, f"a package from a server of kind {host}")
+    count = len([each for each in ranges if each])
+    assert (count > 1) == (host == "ranges"), f"{host}: {count} requests for ranges"
+
+
+def check_missing_packs(visitor, url, folder, camera, reference):
+    """Without its last packs, the package is drawn coarse, and the page reports it."""
+    packs = sorted((folder / "packs").iterdir(), key=lambda path: int(path.name.split("-")[0]))
+    assert len(packs) > 1, "the package has too few packs for this check"
+    for pack in packs[1:]:
+        pack.unlink()
+    visitor.open(f"{url}/{PLAIN}")
+    visitor.show(camera, complete=False)
+    visitor.wait_until("document.getElementById('status').textContent.includes('--check')")
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    _, near, _ = compare(reference, depths, camera)
+    assert near < MIN_EQUAL_DEPTH, "no tile is missing: the check sees nothing"
+    visitor.picture("missing-packs")
+
+
+def check_packages(walk, city):
+    """Checks a package of the city."""
+    folder = walk.folder / "package"
+    walk.voxdag.run("publish", city.built, "-o", folder, "--pack-size", "512KiB")
+    camera, reference = city.cameras["street"], city.references["street"]
+    for host in CHECKED_HOSTS:
+        with serve(folder, host) as url:
+            visitor = walk.visitor(f"package-{host}")
+            with visitor.expecting("416" if host == "refused" else "nothing"):
+                check_host(visitor, url, host, camera, reference)
+            visitor.leave()
+        walk.say(f"a package from a server of kind {host}")
+    with serve(folder, "ranges") as url:
+        visitor = walk.visitor("package-missing")
+        with visitor.expecting("404"):
+            check_missing_packs(visitor, url, folder, camera, reference)
+        visitor.leave()
+    walk.say("a package without its last packs")
