@@ -14,6 +14,7 @@
 #include "scene/points/text_points.h"
 #include "scene/stl/stl_scene.h"
 #include "scene/text/characters.h"
+#include "scene/text/other_formats.h"
 
 namespace voxdag {
 namespace {
@@ -26,7 +27,7 @@ constexpr std::string_view kLasEndings[] = {".las"};
 constexpr std::string_view kTextPointEndings[] = {".xyz", ".txt", ".csv"};
 
 bool is_points(const ReadableFile& file) {
-  return !is_other_text(file) && points::is_text_points(file);
+  return !is_other_text(first_bytes_of(file)) && points::is_text_points(file);
 }
 
 constexpr SceneFormat kFormats[] = {

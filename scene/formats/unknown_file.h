@@ -5,10 +5,6 @@
 
 namespace voxdag {
 
-// True if the first bytes identify a text format that voxdag recognizes but does not read, such as
-// a Git LFS pointer or a web page.
-bool is_other_text(const ReadableFile& file);
-
 // Throws Error{kInvalidInput} for a file of no known scene format. If the first bytes identify
 // another format, the message names that format and a remedy. The message always lists the formats
 // that voxdag reads.

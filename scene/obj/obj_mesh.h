@@ -33,7 +33,7 @@ class ObjMesh : public IndexedMesh {
                      SurfaceTriangle* out) override;
   std::string place_of(uint64_t triangle) override { return faces_.place_of(triangle); }
   std::string name_index(uint64_t triangle, int corner, uint32_t) override {
-    return "index " + std::to_string(faces_.index_in_file(triangle, static_cast<size_t>(corner)));
+    return "index " + faces_.index_text(triangle, static_cast<size_t>(corner));
   }
   // Returns the vertex's name with its number in the file, which counts from 1.
   std::string name_vertex(uint32_t index) override {

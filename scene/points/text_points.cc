@@ -126,10 +126,10 @@ std::string_view take_line(std::string_view& text, bool is_complete) {
 bool is_text_points(const ReadableFile& file) {
   std::string begin(std::min(file.size(), kSniffedBytes), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(begin)));
-  std::string_view text = begin;
+  const bool is_complete = begin.size() == file.size();
+  std::string_view text = is_complete ? without_end_marks(begin) : begin;
   if (text.find('\0') != std::string_view::npos) return false;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
-  const bool is_complete = begin.size() == file.size();
   const std::string_view first = take_line(text, is_complete);
   if (count_numbers(first) >= 3) return true;
   const auto columns = Columns::of_header(first);

@@ -17,11 +17,28 @@ bool is_keyword(std::string_view word) {
       kKeywords, [&](std::string_view keyword) { return equals_in_any_case(keyword, word); });
 }
 
+// True if `word` and the words `after` it begin a facet. A name may contain the word "facet".
+bool begins_facet(std::string_view word, std::string_view after) {
+  if (!equals_in_any_case(word, "facet")) return false;
+  const std::string_view next = next_word(after);
+  return equals_in_any_case(next, "normal") || equals_in_any_case(next, "outer");
+}
+
+// True if `word` and the words `after` it begin a part of the format.
+bool begins_statement(std::string_view word, std::string_view after) {
+  if (equals_in_any_case(word, "vertex")) return parse_real<double>(next_word(after)).has_value();
+  constexpr std::string_view kEnds[] = {"endloop", "endfacet", "endsolid"};
+  return begins_facet(word, after) || std::ranges::any_of(kEnds, [&](std::string_view end) {
+           return equals_in_any_case(end, word);
+         });
+}
+
 }  // namespace
 
 void PolygonReader::seek(uint64_t offset, uint64_t line) {
   lines_.seek(offset, line);
   rest_ = {};
+  is_name_next_ = false;
 }
 
 bool PolygonReader::next() {
@@ -71,9 +88,11 @@ bool PolygonReader::next_line() {
   return found;
 }
 
-// Skips the name or the numbers after a word other than "vertex".
+// Skips the name, the numbers or other words after a word other than "vertex".
 void PolygonReader::skip(std::string_view word) {
   const auto is = [&](std::string_view keyword) { return equals_in_any_case(word, keyword); };
+  if (!is_keyword(word)) return skip_unknown();
+  is_name_next_ = false;
   if (is("facet")) {
     in_facet_ = true;
   } else if (is("endfacet")) {
@@ -81,18 +100,37 @@ void PolygonReader::skip(std::string_view word) {
   } else if (is("normal")) {
     skip_normal();
   } else if (is("solid") || is("endsolid")) {
-    rest_ = {};  // a name
-  } else if (!is_keyword(word)) {
-    if (unknown_words_++ == 0) first_unknown_line_ = lines_.number();
-    rest_ = {};
+    is_name_next_ = trimmed(rest_).empty();
+    skip_words(begins_facet);
+  }
+}
+
+// Skips words that are not part of STL. A line of one word after a line that ends with "solid" is
+// a name.
+void PolygonReader::skip_unknown() {
+  if (is_name_next_ && trimmed(rest_).empty()) return;
+  if (unknown_words_++ == 0) first_unknown_line_ = lines_.number();
+  skip_words(begins_statement);
+}
+
+// Skips the rest of the line, or the words up to the first one for which `is_end` is true.
+void PolygonReader::skip_words(bool (*is_end)(std::string_view word, std::string_view after)) {
+  for (std::string_view after = rest_;; rest_ = after) {
+    const std::string_view word = next_word(after);
+    if (word.empty() || is_end(word, after)) return;
   }
 }
 
 // Skips the words of the normal: up to three, which are usually numbers. Stops at a keyword.
 void PolygonReader::skip_normal() {
   for (int i = 0; i < 3; ++i) {
-    std::string_view after = rest_;
-    if (is_keyword(next_word(after))) return;
+    std::string_view after = rest_, word = next_word(after);
+    while (word.empty()) {
+      if (!next_line()) return;
+      after = rest_;
+      word = next_word(after);
+    }
+    if (is_keyword(word)) return;
     rest_ = after;
   }
 }

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "scene/stl/facet.h"
 #include "scene/text/characters.h"
@@ -32,17 +33,30 @@ std::string next_keyword(std::string_view& text) {
   return word;
 }
 
+// True if the text has the words "facet normal" or "facet outer" before any zero byte.
+bool has_facet(std::string_view text) {
+  text = text.substr(0, text.find('\0'));
+  std::string last;
+  for (std::string word = next_keyword(text); !word.empty(); word = next_keyword(text)) {
+    if (last == "facet" && (word == "normal" || word == "outer")) return true;
+    last = std::move(word);
+  }
+  return false;
+}
+
 // True if the text begins with "solid", and the next line that is not blank begins with "facet",
-// "endsolid" or "color". Also true if no such next line exists. The rest of the first line is a
-// name.
+// "endsolid" or "color", or a facet begins elsewhere. Also true if no such next line exists. The
+// rest of the first line is a name.
 bool is_ascii(std::string_view text) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   if (next_keyword(text) != "solid") return false;
   const size_t line_end = text.find_first_of("\r\n");
   if (line_end == text.npos) return text.find('\0') == text.npos;
   text.remove_prefix(line_end);
-  const std::string second = next_keyword(text);
-  return second.empty() || second == "facet" || second == "endsolid" || second == "color";
+  std::string_view rest = text;
+  const std::string second = next_keyword(rest);
+  return second.empty() || second == "facet" || second == "endsolid" || second == "color" ||
+         has_facet(text);
 }
 
 // True if the coordinates are 0 or have usual magnitudes, and the normal is roughly a unit vector

@@ -8,6 +8,16 @@ namespace voxdag {
 constexpr bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
 constexpr bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 
+// Ctrl-Z, with which old editors mark the end of a text. NUL bytes may follow it, or replace it.
+constexpr char kEndMark = '\x1a';
+constexpr bool is_end_mark(char c) { return c == kEndMark || c == '\0'; }
+
+// Returns the text without end marks at its end.
+constexpr std::string_view without_end_marks(std::string_view text) {
+  while (!text.empty() && is_end_mark(text.back())) text.remove_suffix(1);
+  return text;
+}
+
 // Returns the text without blanks at both ends.
 constexpr std::string_view trimmed(std::string_view text) {
   while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);

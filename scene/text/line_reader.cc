@@ -52,6 +52,8 @@ bool LineReader::next() {
     ++next_number_;
   } while (join_ == Join::kBackslash && join(end) && end.begin < end.end);
   text_ = {buffer_.data() + line_, end.begin - line_};
+  if (!text_.empty() && is_end_mark(text_.back()) && base_ + next_ == file_.size())
+    text_ = without_end_marks(text_);
   return next_ > line_;
 }
 

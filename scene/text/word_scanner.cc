@@ -1,5 +1,8 @@
 #include "scene/text/word_scanner.h"
 
+#include <algorithm>
+#include <cstddef>
+
 #include "scene/text/characters.h"
 
 namespace voxdag {
@@ -8,6 +11,9 @@ namespace {
 // Maximum length of a word in bytes. No program writes longer numbers. A longer word is returned in
 // pieces, so the row has too many words and is refused.
 constexpr size_t kMaxWord = 64;
+
+// Maximum number of marks at the end of a text.
+constexpr size_t kMaxMarks = 4096;
 
 }  // namespace
 
@@ -22,13 +28,25 @@ void WordScanner::begin_row(uint64_t offset) {
 
 std::string_view WordScanner::word() {
   skip_blanks();
-  const auto bytes = window_.at(offset_, kMaxWord);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data()),
-                              std::min(bytes.size(), kMaxWord));
+  const std::string_view text = text_at(offset_);
   size_t size = 0;
   while (size < text.size() && !is_blank(text[size]) && !is_line_end(text[size])) ++size;
+  if (size > 0 && is_end_mark(text[size - 1])) return word_before_marks(text.substr(0, size));
   offset_ += size;
   return text.substr(0, size);
+}
+
+// Returns the word at offset_, and moves past it. If it ends with marks at the end of the file,
+// leaves them out.
+std::string_view WordScanner::word_before_marks(std::string_view word) {
+  const uint64_t begin = offset_;
+  size_t size = word.size();
+  offset_ += without_end_marks(word).size();
+  if (is_at_end())
+    size = static_cast<size_t>(offset_ - begin);
+  else
+    offset_ = begin + size;
+  return text_at(begin).substr(0, size);
 }
 
 bool WordScanner::end_row() {
@@ -43,7 +61,20 @@ bool WordScanner::end_row() {
 // is refused as a word.
 char WordScanner::peek() {
   const auto bytes = window_.at(offset_, 1);
-  return bytes.empty() ? '\0' : static_cast<char>(bytes[0]);
+  const char c = bytes.empty() ? '\0' : static_cast<char>(bytes[0]);
+  return c == kEndMark && is_at_end() ? '\0' : c;
+}
+
+std::string_view WordScanner::text_at(uint64_t offset) {
+  const auto bytes = window_.at(offset, kMaxWord);
+  return {reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kMaxWord)};
+}
+
+// True if only marks of the end of the text follow (characters.h).
+bool WordScanner::is_at_end() {
+  const auto bytes = window_.at(offset_, kMaxMarks);
+  return offset_ + bytes.size() >= window_.file().size() &&
+         std::ranges::all_of(bytes, [](std::byte b) { return is_end_mark(static_cast<char>(b)); });
 }
 
 void WordScanner::skip_blanks() {

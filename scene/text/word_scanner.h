@@ -1,5 +1,5 @@
 // Reads the lines of a text file word by word, such as the rows of an ASCII PLY file. Blank lines
-// are skipped. Not thread-safe.
+// and marks at the end of the file (characters.h) are skipped. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -25,6 +25,9 @@ class WordScanner {
  private:
   char peek();
   void skip_blanks();
+  std::string_view word_before_marks(std::string_view word);
+  std::string_view text_at(uint64_t offset);
+  bool is_at_end();
 
   FileWindow window_;
   uint64_t offset_ = 0;

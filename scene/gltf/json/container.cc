@@ -25,10 +25,11 @@ uint32_t read_u32(const ReadableFile& file, uint64_t offset) {
   return value;
 }
 
-// True for blanks, line ends and zeros. Some programs pad JSON with zeros.
+// True for blanks, line ends, zeros and Ctrl-Z. Some programs pad JSON with zeros, or end it with
+// Ctrl-Z.
 bool is_filler(std::byte b) {
   return b == std::byte{0} || b == std::byte{' '} || b == std::byte{'\t'} || b == std::byte{'\n'} ||
-         b == std::byte{'\r'};
+         b == std::byte{'\r'} || b == std::byte{0x1a};
 }
 
 // Returns the range without zeros and white space at its end.

@@ -30,9 +30,9 @@ std::string FaceReader::place_of(uint64_t triangle) {
   return polygons_.place();
 }
 
-int64_t FaceReader::index_in_file(uint64_t triangle, size_t corner) {
+std::string FaceReader::index_text(uint64_t triangle, size_t corner) {
   seek(triangle);
-  return polygons_.corner(corner_of(triangle, corner)).vertex;
+  return polygons_.index_text(corner_of(triangle, corner));
 }
 
 // Reads the face that contains the triangle. Continues from the current face, unless the triangle

@@ -33,7 +33,7 @@ class FaceReader {
   // Returns the face and line of a triangle, for messages.
   std::string place_of(uint64_t triangle);
   // Returns the vertex index of a corner as written in the file.
-  int64_t index_in_file(uint64_t triangle, size_t corner);
+  std::string index_text(uint64_t triangle, size_t corner);
 
  private:
   struct Splitter {

@@ -50,7 +50,7 @@ class ObjFile::Scan {
     }
   }
 
-  IgnoredStatements points_or_lines, unknown, small_faces;
+  IgnoredStatements points_or_lines, unknown, small_faces, unnamed_materials, unnamed_libraries;
   bool has_polygons = false;  // true if a face has more than three corners
 
  private:
@@ -65,10 +65,9 @@ class ObjFile::Scan {
       case Kind::kFace:
         return add_face(statement);
       case Kind::kUseMaterial:
-        material_ = obj_.materials_.add(trimmed(statement.arguments), lines_.number());
-        return;
+        return use_material(statement);
       case Kind::kLibrary:
-        return add_library(statement.arguments);
+        return add_library(statement);
       case Kind::kPointOrLine:
         return points_or_lines.add(statement, lines_.number());
       case Kind::kUnknown:
@@ -108,7 +107,7 @@ class ObjFile::Scan {
                             material_});
     ++obj_.faces_;
     const size_t corners = count_words(statement.arguments);
-    if (corners < 3) return small_faces.add(statement, lines_.number());
+    if (corners < 3) return add_small_face(statement);
     obj_.triangles_ += corners - 2;
     has_polygons = has_polygons || corners > 3;
     UsedMaterials::Use& use = obj_.materials_.all()[material_];
@@ -116,7 +115,28 @@ class ObjFile::Scan {
     if (!has_texture(statement.arguments)) ++use.faces_without_texture;
   }
 
-  void add_library(std::string_view names) {
+  // Adds a face of fewer than three corners, such as "f 1,2,3", whose corner is not an index.
+  void add_small_face(const Statement& statement) {
+    std::string_view arguments = statement.arguments;
+    for (size_t corner = 0; has_word(arguments); ++corner) {
+      const std::string_view rest = arguments;
+      Corner read;
+      if (!next_corner(arguments, read))
+        refuse(obj_.file_->path(), place_of_face(obj_.faces_ - 1, lines_.number()) + ": " +
+                                       describe_bad_corner(corner, rest));
+    }
+    small_faces.add(statement, lines_.number());
+  }
+
+  void use_material(const Statement& statement) {
+    const std::string_view name = trimmed(statement.arguments);
+    if (name.empty()) unnamed_materials.add(statement, lines_.number());
+    material_ = obj_.materials_.add(name, lines_.number());
+  }
+
+  void add_library(const Statement& statement) {
+    const std::string_view names = statement.arguments;
+    if (names.empty()) return unnamed_libraries.add(statement, lines_.number());
     const auto same = [&](const Library& library) { return library.names == names; };
     if (std::ranges::any_of(obj_.libraries_, same)) return;
     if (obj_.libraries_.size() == kMaxLibraries)
@@ -159,6 +179,8 @@ void ObjFile::add_warnings(const Scan& scan) {
                      ignored.count});
   };
   add("degenerate-faces", scan.small_faces, "a face of fewer than three corners makes no voxels");
+  add("missing-material", scan.unnamed_materials, "usemtl has no name; its faces are white");
+  add("missing-file", scan.unnamed_libraries, "mtllib has no name; it is ignored");
   add("points-or-lines", scan.points_or_lines, "points and lines make no voxels");
   if (faces_ == 0 && vertices_ > 0 && scan.points_or_lines.count == 0)
     warnings_.add({"points-or-lines", file_->path(),

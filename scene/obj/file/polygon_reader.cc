@@ -43,12 +43,8 @@ void PolygonReader::parse(std::string_view arguments) {
   while (has_word(arguments)) {
     const std::string_view rest = arguments;
     Corner corner;
-    if (!next_corner(arguments, corner)) {
-      std::string_view word = rest;
-      refuse(obj_.file().path(), place() + ": corner " + std::to_string(corners_.size()) + " is " +
-                                     printable(next_word(word)) +
-                                     ", expected v, v/vt, v//vn or v/vt/vn");
-    }
+    if (!next_corner(arguments, corner))
+      refuse(obj_.file().path(), place() + ": " + describe_bad_corner(corners_.size(), rest));
     if (corners_.size() == kMaxCorners)
       throw Error(ErrorCode::kLimit, obj_.file().path() + ": " + place() +
                                          " has more corners than the limit, " +
@@ -58,8 +54,21 @@ void PolygonReader::parse(std::string_view arguments) {
   }
 }
 
-std::string PolygonReader::place() const {
-  return "face " + std::to_string(face()) + " in line " + std::to_string(lines_.number());
+std::string PolygonReader::place() const { return place_of_face(face(), lines_.number()); }
+
+std::string PolygonReader::index_text(size_t k) const {
+  std::string_view rest = statement_of(lines_.text()).arguments, corner;
+  for (size_t i = 0; i <= k; ++i) corner = next_word(rest);
+  return printable(corner.substr(0, corner.find('/')));
+}
+
+std::string place_of_face(uint64_t face, uint64_t line) {
+  return "face " + std::to_string(face) + " in line " + std::to_string(line);
+}
+
+std::string describe_bad_corner(size_t corner, std::string_view rest) {
+  return "corner " + std::to_string(corner) + " is " + printable(next_word(rest)) +
+         ", expected v, v/vt, v//vn or v/vt/vn";
 }
 
 }  // namespace voxdag::obj

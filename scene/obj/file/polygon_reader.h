@@ -31,13 +31,14 @@ class PolygonReader {
   // range, and its material.
   uint64_t face() const { return next_face_ - 1; }
   size_t size() const { return corners_.size(); }
-  const Corner& corner(size_t k) const { return corners_[k]; }
   std::span<const uint32_t> vertices() const { return vertices_; }
   uint32_t material() const { return material_; }
   // Returns the index of a corner's texture coordinates.
   uint32_t texcoord(size_t k) const { return resolve(corners_[k].texture, texcoords_before_); }
-  // Returns the polygon and its line, for messages.
+  // Return the polygon and its line, and the vertex index of a corner as written in the file, for
+  // messages.
   std::string place() const;
+  std::string index_text(size_t k) const;
 
  private:
   void parse(std::string_view arguments);
@@ -50,5 +51,10 @@ class PolygonReader {
   std::vector<Corner> corners_;
   std::vector<uint32_t> vertices_;
 };
+
+// Return parts of messages: the face and its line, and a corner that is no index. `rest` begins
+// with the corner.
+std::string place_of_face(uint64_t face, uint64_t line);
+std::string describe_bad_corner(size_t corner, std::string_view rest);
 
 }  // namespace voxdag::obj

@@ -7,6 +7,7 @@
 #include "scene/lfs_pointer.h"
 #include "scene/messages.h"
 #include "scene/text/characters.h"
+#include "scene/text/other_formats.h"
 #include "scene/text/side_files.h"
 
 namespace voxdag::obj {
@@ -32,6 +33,15 @@ std::vector<std::string> names_of(std::string_view arguments) {
   return has_ending ? names : words;
 }
 
+// Throws Error for a file that is no text, such as a compressed library.
+void refuse_other_format(const ReadableFile& file) {
+  const std::string begin = first_bytes_of(file);
+  const std::string_view text = file.size() == begin.size() ? without_end_marks(begin) : begin;
+  if (!is_no_text(text)) return;
+  const std::string known = describe_other_format(begin);
+  refuse(file.path(), known.empty() ? "is not a text, expected a library of materials" : known);
+}
+
 class LibraryList {
  public:
   LibraryList(FileSystem& files, const ObjFile& obj, MemoryBudget& budget, GrowingCharge& charge,
@@ -55,6 +65,7 @@ class LibraryList {
     try {
       file = open_side_file(files_, obj_.file().path(), name);
       refuse_lfs_pointer(*file, "the library of materials");
+      refuse_other_format(*file);
     } catch (const Error& error) {
       if (from) warn(*from, name, error.message());
       return false;

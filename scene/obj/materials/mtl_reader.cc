@@ -35,6 +35,7 @@ class LibraryReader {
   static constexpr uint64_t kNodeBytes = 96;  // bytes of a hash table's node
 
   void begin_material(std::string_view name) {
+    if (name.empty()) warn("missing-material", "newmtl has no name; no face can use its material");
     const auto [place, is_new] = numbers_.try_emplace(std::string(name), materials_.size());
     current_ = place->second;
     if (is_new) {
@@ -54,8 +55,8 @@ class LibraryReader {
     if (is("Kd"))
       read_diffuse(arguments, material);
     else if (is("d"))
-      material.is_dissolved = read_opacity(arguments, material);
-    else if (is("Tr") && !material.is_dissolved && read_opacity(arguments, material))
+      material.is_dissolved = read_opacity(keyword, arguments, material);
+    else if (is("Tr") && !material.is_dissolved && read_opacity(keyword, arguments, material))
       material.opacity = 1 - material.opacity;
     else if (is("map_Kd"))
       material.diffuse_map = read_map(keyword, arguments);
@@ -68,17 +69,26 @@ class LibraryReader {
     std::array<double, 3> numbers;
     const size_t count = read_numbers(arguments, numbers.data(), numbers.size());
     if (count == 0)
-      return warn("unsupported-color", "Kd has " + printable(arguments) +
-                                           ", expected red, green and blue; it is ignored");
+      return warn("unsupported-color",
+                  "Kd has " + shown(arguments) + ", expected red, green and blue; it is ignored");
     for (size_t c = count; c < numbers.size(); ++c) numbers[c] = numbers[0];
     material.diffuse = numbers;
   }
 
-  bool read_opacity(std::string_view arguments, LibraryMaterial& material) {
+  static std::string shown(std::string_view arguments) {
+    return arguments.empty() ? "nothing" : printable(arguments);
+  }
+
+  bool read_opacity(std::string_view keyword, std::string_view arguments,
+                    LibraryMaterial& material) {
     std::string_view rest = arguments;
     if (next_word(rest) == "-halo") arguments = rest;
     double number;
-    if (read_numbers(arguments, &number, 1) == 0) return false;
+    if (read_numbers(arguments, &number, 1) == 0) {
+      warn("unsupported-color",
+           printable(keyword) + " has " + shown(arguments) + ", expected a number; it is ignored");
+      return false;
+    }
     material.opacity = number;
     return true;
   }
@@ -90,6 +100,8 @@ class LibraryReader {
     if (!unsupported.empty())
       warn("ignored-map-options",
            "the options " + unsupported + " of " + printable(keyword) + " are ignored");
+    if (map.file.empty())
+      warn("missing-file", printable(keyword) + " has no name of an image; it is ignored");
     return map;
   }
 

@@ -232,6 +232,17 @@ TEST(PlyVariants, RowsOfSeveralLines) {
     EXPECT_NE(error_of_file(header + rows).message().find(message), std::string::npos) << rows;
 }
 
+// Old editors end a text with Ctrl-Z or with NUL bytes.
+TEST(PlyVariants, MarksAtTheEnd) {
+  const std::string rows = "0 0 0 1 0 0\n0 1 0\n3 0 1 2";
+  for (const std::string& mark : {std::string("\x1a"), std::string("\n\x1a"), std::string("\0", 1),
+                                  "\r\n\x1a" + std::string(300, '\0')}) {
+    EXPECT_EQ(triangles_of_file(ascii_header(kListLine) + kRows + mark), kOnlyLower);
+    EXPECT_EQ(triangles_of_file(ascii_header(kListLine) + rows + mark), kOnlyLower);
+  }
+  EXPECT_NE(error_of_file(ascii_header(kListLine) + rows + "\n\x1a 7").message(), "");
+}
+
 TEST(PlyVariants, NumbersAsTextOfOtherPrograms) {
   const std::string header = replaced(ascii_header(kListLine), "vertex 3", "vertex 6");
   const std::string unused =

@@ -13,6 +13,24 @@ using test::triangles_of;
 using testing::AllOf;
 using testing::HasSubstr;
 
+// Returns a text whose characters have `bytes` bytes; byte `at` is the ASCII character.
+std::string wide(std::string_view text, size_t bytes, size_t at) {
+  std::string all(text.size() * bytes, '\0');
+  for (size_t i = 0; i < text.size(); ++i) all[i * bytes + at] = text[i];
+  return all;
+}
+
+// Returns the header of a tar file without magic number, as before POSIX.
+std::string old_tar(std::string name) {
+  name.resize(512, '\0');
+  name.replace(148, 8, 8, ' ');
+  unsigned sum = 0;
+  for (const char c : name) sum += static_cast<unsigned char>(c);
+  std::string digits;
+  for (int i = 0; i < 6; ++i, sum /= 8) digits.insert(0, 1, static_cast<char>('0' + sum % 8));
+  return name.replace(148, 7, digits + '\0');
+}
+
 TEST(UnknownFile, IsNamedByItsFirstBytes) {
   const std::pair<std::string, const char*> cases[] = {
       {"\x1f\x8b\x08\x00 compressed", "is compressed by gzip: unpack it first"},
@@ -35,7 +53,24 @@ TEST(UnknownFile, IsNamedByItsFirstBytes) {
       {"RIFF....WEBPVP8L", "is a WebP image"},
       {"", "is empty; expected a scene"},
       {" \n\n", "begins with blanks only"},
-      {std::string("\xff\xfev\0 \0", 6), "is text in UTF-16: convert it first"},
+      {std::string("\xff\xfev\0 \0", 6),
+       "is text in UTF-16LE: convert it first: iconv -f UTF-16LE"},
+      {std::string("\xfe\xff\0v\0 ", 6), "is text in UTF-16BE: convert it first"},
+      {std::string("\xff\xfe\0\0v\0\0\0", 8), "is text in UTF-32LE: convert it first"},
+      {std::string("\0\0\xfe\xff\0\0\0v", 8), "is text in UTF-32BE: convert it first"},
+      {wide("v 0 0 0\n", 2, 0), "is text in UTF-16LE: convert it first"},
+      {wide("v 0 0 0\n", 2, 1), "is text in UTF-16BE: convert it first"},
+      {wide("ply\r\n", 4, 0), "is text in UTF-32LE: convert it first"},
+      {wide("{\"a\":1}", 4, 3), "is text in UTF-32BE: convert it first"},
+      {"\x1f\x9d\x90\x76", "is compressed by compress: unpack it first"},
+      {std::string("]\0\0\x80\0\xff", 6), "is compressed by lzma: unpack it first"},
+      {"LZIP\x01", "is compressed by lzip"},
+      {old_tar("model.obj"), "is a tar archive: unpack it first"},
+      {"ASTM-E57\x01", "is an E57 point cloud: convert it to PLY or LAS"},
+      {"3\n0 0 0 9 255 0 0\n1 0 0 9 0 0 0\n", "is a PTS point cloud: remove its first line"},
+      {"2\r\n2\r\n0 0 0\r\n1 0 0\r\n", "is a PTX point cloud: convert it to LAS or PLY"},
+      {"// made by hand\n{\"asset\": 1}", "is JSON with comments, which glTF does not allow"},
+      {"/* a */ // b\r\n\n{}", "is JSON with comments, which glTF does not allow"},
       {"caf\xe9 caf\xc3\xa9", "it begins with caf? caf\xc3\xa9"},
       {"hello\x1b[2J", "has an unknown format; it begins with hello?[2J"},
   };
@@ -73,6 +108,8 @@ TEST(UnknownFile, OtherTextsAreNotPoints) {
 TEST(UnknownFile, JsonIsGltf) {
   for (const char* text : {"{", "[", "\n\t {", "\xef\xbb\xbf{", "glTF"})
     EXPECT_THAT(error_of_file(text).message(), testing::Not(HasSubstr("expected a scene")));
+  const std::string text = R"({"asset":{"version":"2.0"}})";
+  EXPECT_EQ(error_of_file(text + "\n\x1a").message(), "");
 }
 
 }  // namespace

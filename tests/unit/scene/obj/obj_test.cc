@@ -66,16 +66,32 @@ TEST(Obj, NumbersAreTheNearestDoubles) {
 }
 
 TEST(Obj, StatementsWithoutVoxelsAreIgnored) {
-  const std::string file =
-      "mtllib\no a\ng b c\ns off\nusemtl\nvp 0 0\nlod 2\nmg 1 2\n" + kVertexLines;
+  const std::string file = "o a\ng b c\ns off\nvp 0 0\nlod 2\nmg 1 2\n" + kVertexLines;
   EXPECT_TRUE(warnings_of(file + "f 1 2 3").empty());
   const auto warnings =
       warnings_of(file + "l 1 2\np 1\nf 1 2\nhello world\nf 1 2 3\nl 2 3\nnews\n");
   EXPECT_THAT(
       warnings,
-      ElementsAre("folder/scene: line 14: a face of fewer than three corners makes no voxels",
-                  AllOf(HasSubstr("line 12: points and lines"), HasSubstr("(3 times)")),
-                  AllOf(HasSubstr("line 15"), HasSubstr("\"hello\""), HasSubstr("(2 times)"))));
+      ElementsAre("folder/scene: line 12: a face of fewer than three corners makes no voxels",
+                  AllOf(HasSubstr("line 10: points and lines"), HasSubstr("(3 times)")),
+                  AllOf(HasSubstr("line 13"), HasSubstr("\"hello\""), HasSubstr("(2 times)"))));
+}
+
+TEST(Obj, StatementsWithoutNames) {
+  EXPECT_THAT(warnings_of("mtllib \n" + kVertexLines + "usemtl\nf 1 2 3\nusemtl\t\n"),
+              ElementsAre("folder/scene: line 5: usemtl has no name; its faces are white (2 times)",
+                          "folder/scene: line 1: mtllib has no name; it is ignored"));
+}
+
+// Old editors end a text with Ctrl-Z or with NUL bytes.
+TEST(Obj, MarksAtTheEnd) {
+  for (const std::string& mark : {std::string("\x1a"), std::string("\n\x1a"), std::string("\0", 1),
+                                  std::string("\n\0\0", 3), "\r\n\x1a" + std::string(300, '\0')}) {
+    OpenScene open(kVertexLines + "f 1 2 3" + mark);
+    EXPECT_EQ(open.triangles(), std::vector<Corners>{kLower});
+    EXPECT_TRUE(open.source->warnings().empty());
+  }
+  EXPECT_THAT(warnings_of(kVertexLines + "\x1a\nf 1 2 3\n"), ElementsAre(HasSubstr("unknown")));
 }
 
 TEST(Obj, FaultsNameTheLine) {
@@ -84,7 +100,13 @@ TEST(Obj, FaultsNameTheLine) {
             "folder/scene: face 0 in line 4: index 4 does not exist, there are 3 vertices");
   EXPECT_THAT(message(kVertexLines + "\nf 1 2 -4\n"), HasSubstr("face 0 in line 5: index -4"));
   EXPECT_THAT(message(kVertexLines + "f 1 2 0\n"), HasSubstr("index 0"));
-  EXPECT_THAT(message(kVertexLines + "f 1 2 99999999999999999999\n"), HasSubstr("index 9"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 99999999999999999999\n"),
+              HasSubstr("index 99999999999999999999 does not exist"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 -9007199254740993/1\n"),
+              HasSubstr("index -9007199254740993 does not exist"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2 3\nf 1,2,3\n"),
+              HasSubstr("face 1 in line 5: corner 0 is 1,2,3, expected v, v/vt, v//vn or v/vt/vn"));
+  EXPECT_THAT(message(kVertexLines + "f 1 2/x\n"), HasSubstr("corner 1 is 2/x, expected"));
   EXPECT_THAT(message(kVertexLines + "f 1 2 x\n"), HasSubstr("face 0 in line 4: corner 2 is x"));
   EXPECT_THAT(message(kVertexLines + "f 1 2 3;\n"), HasSubstr("corner 2 is 3;"));
   EXPECT_THAT(message("v 0 0\nvn 0 0 1\nf 1 1 1\n"),
@@ -179,6 +201,28 @@ TEST(Obj, VertexColors) {
 }
 
 const std::string kTriangleLines = kVertexLines + "vt 0 0\nvt 1 0\nvt 0.5 0.25 0\n";
+
+// A library that is compressed, or in another encoding, is named.
+TEST(Obj, LibrariesThatAreNoText) {
+  const auto warnings_of_library = [](const std::string& text) {
+    const WithLibraries open("mtllib a.mtl\n" + kTriangleLines + "f 1 2 3\n",
+                             {{"folder/a.mtl", text}});
+    return texts_of(open.source->materials().warnings.list());
+  };
+  const std::string zero(1, '\0');
+  EXPECT_THAT(warnings_of_library("\x1f\x8b\x08 compressed"),
+              ElementsAre(HasSubstr("mtllib a.mtl cannot be opened (folder/a.mtl: is compressed by "
+                                    "gzip: unpack it first); its materials are white")));
+  EXPECT_THAT(warnings_of_library("\xff\xfe#" + zero + "a" + zero),
+              ElementsAre(HasSubstr("is text in UTF-16LE: convert it first")));
+  EXPECT_THAT(warnings_of_library("newmtl a\n\x01\n"), ElementsAre(HasSubstr("is not a text")));
+  EXPECT_TRUE(warnings_of_library("newmtl a\nKd 1 0 0\n\x1a" + zero).empty());
+  EXPECT_THAT(warnings_of_library("newmtl \nnewmtl a\nd x\nTr\nmap_Kd -s 1 1 1\n"),
+              ElementsAre(HasSubstr("line 1: newmtl has no name"),
+                          HasSubstr("line 3: d has x, expected a number; it is ignored"),
+                          HasSubstr("line 4: Tr has nothing, expected a number"),
+                          HasSubstr("line 5: map_Kd has no name of an image")));
+}
 
 TEST(Obj, MaterialsOfLibraries) {
   const std::string file = "mtllib my colors.mtl second.mtl\n" + kTriangleLines +

@@ -50,6 +50,11 @@ TEST(TextPoints, CommentsBlankLinesAndByteOrderMark) {
   EXPECT_EQ(points_of("1 2 3\n# the end").size(), 1u);
 }
 
+TEST(TextPoints, MarksAtTheEnd) {
+  for (const std::string& mark : {std::string("\x1a"), std::string("\n\x1a\0\0", 4)})
+    EXPECT_EQ(points_of("0.1 -2 30000\n4 5.5 6" + mark), kTwo);
+}
+
 TEST(TextPoints, HeaderLineNamesColumns) {
   EXPECT_EQ(points_of("id,Z,\"X\",y,note\n1,30000,0.1,-2,a\n2,6,4,5.5,\"b, c\"\n"), kTwo);
   EXPECT_EQ(points_of("note;x;y;z\n\"a;b\";0.1;-2;3e4\n;4;5.5;6\n"), kTwo);

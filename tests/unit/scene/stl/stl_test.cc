@@ -79,6 +79,38 @@ TEST(Stl, AsciiInManyForms) {
   EXPECT_TRUE(triangles_of_file("solid a\nendsolid a\n").empty());
 }
 
+std::string with_line_ends(std::string text) {
+  std::ranges::replace(text, ' ', '\n');
+  return text;
+}
+
+// Line ends only separate words, except that they end the names of solids.
+TEST(Stl, AsciiWordsInAnyLines) {
+  const std::string facet =
+      "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 "
+      "endloop endfacet ";
+  const std::vector<Corners> one{kLower}, two{kLower, kLower};
+  const std::pair<std::string, std::vector<Corners>> cases[] = {
+      {"solid a part " + facet + "endsolid a part", one},
+      {"solid " + facet + "\nendsolid", one},
+      {"solid a " + facet + "endsolid a solid b " + facet + "endsolid b\n", two},
+      {"solid a " + facet + "\n" + ascii_facet() + "endsolid", two},
+      {with_line_ends("solid a " + facet + facet + "endsolid a "), two},
+      {with_line_ends("solid " + facet + "endsolid solid b " + facet + "endsolid"), two},
+      {"solid a\nfacet\nnormal 0 0\n1\nouter loop vertex\n0 0 0 vertex 1 0 0\nvertex 0 1 0 endloop "
+       "endfacet endsolid",
+       one},
+      {"solid vertex 1\n" + ascii_facet() + "endsolid vertex 1\n", one}};
+  for (const auto& [file, triangles] : cases) {
+    OpenScene open(file);
+    EXPECT_EQ(open.triangles(), triangles) << file;
+    EXPECT_TRUE(open.source->warnings().empty()) << file;
+  }
+  OpenScene open("solid a\ncolor 1 0 0 " + facet + "material 7 endsolid a\n");
+  EXPECT_EQ(open.triangles(), one);
+  EXPECT_THAT(texts_of(open.source->warnings()), ElementsAre(HasSubstr("not part of STL")));
+}
+
 TEST(Stl, AsciiFacetsOfOtherSizes) {
   const std::string square = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex -1 1 0\n";
   OpenScene open("solid\n" + ascii_facet("vertex 0 0 0\nvertex 1 1 1\n") + ascii_facet(square) +
