@@ -111,12 +111,15 @@ struct PrimitiveSurface {
 };
 
 struct Primitive {
+  static constexpr int kBrokenMaterial = -2;
+
   int mode = kTriangleList;
   int position = -1;
   int indices = -1;
   std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
   std::vector<JointSet> joint_sets;
-  int material = -1;                     // as in the file; unchecked, like the next two members
+  // As in the file, and unchecked, like the next two members. kBrokenMaterial: not an index.
+  int material = -1;
   int color = -1;                        // COLOR_0
   std::vector<int> texture_coordinates;  // TEXCOORD_n
   PrimitiveSurface surface;
@@ -180,6 +183,7 @@ struct Document {
   // empty. No image is loaded: a data: URI ends at its comma.
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
+  WarningList material_warnings;      // about the model; not in `warnings`
 
   bool quantized = false;     // KHR_mesh_quantization is used
   bool has_restarts = false;  // KHR_mesh_primitive_restart is used

@@ -41,15 +41,25 @@ std::string string_or_empty(const Json& object, const char* key) {
 }  // namespace
 
 ModelReader::ModelReader(const std::string& scene_path, MemoryBudget& budget)
-    : model_(std::make_shared<tinygltf::Model>()),
+    : path_(scene_path),
+      model_(std::make_shared<tinygltf::Model>()),
       model_charge_(budget, "the description of the materials in " + scene_path),
       parse_charge_(budget, "the description of the materials in " + scene_path) {}
 
-void ModelReader::add(std::string& section, const ElementText& element, uint64_t bytes) {
+void ModelReader::add(Section& section, const ElementText& element, uint64_t bytes) {
   // Charges `bytes` twice, because the old and the new array of a growing vector exist together.
   model_charge_.add(2 * bytes + model_bytes(element));
   parse_charge_.add(kTextCopies * element.text.size() + kTreeBytesPerValue * element.values);
-  section.append(section.empty() ? "" : ",").append(element.text);
+  const auto warn = [&](const std::string& name, const std::string& message) {
+    warnings_.add({"broken-material",
+                   path_ + ": " + section.element + " " + numbered(section.count, name), message});
+  };
+  const std::string text = without_broken_members(section.kind, element, warn);
+  section.text.append(section.count++ == 0 ? "" : ",").append(text);
+}
+
+void ModelReader::add_violation(const std::string& message) {
+  warnings_.add({"unusable-materials", path_, message + "; it is ignored"});
 }
 
 void ModelReader::add_material(const ElementText& element) {
@@ -82,9 +92,9 @@ void ModelReader::add_image(const JsonElement& element) {
 }
 
 void ModelReader::parse(Document& document) {
-  const std::string text = R"({"materials":[)" + std::exchange(materials_, {}) +
-                           R"(],"textures":[)" + std::exchange(textures_, {}) +
-                           R"(],"samplers":[)" + std::exchange(samplers_, {}) + "]}";
+  const std::string text = R"({"materials":[)" + std::exchange(materials_.text, {}) +
+                           R"(],"textures":[)" + std::exchange(textures_.text, {}) +
+                           R"(],"samplers":[)" + std::exchange(samplers_.text, {}) + "]}";
   std::string errors, warnings;
   bool is_loaded = false;
   std::vector<tinygltf::Image> images = std::move(model_->images);
@@ -106,13 +116,14 @@ void ModelReader::parse(Document& document) {
     model_->materials.clear();
     model_->textures.clear();
     model_->samplers.clear();
-    document.warn("unusable-materials", "",
-                  "its materials cannot be used (" + printable(errors, kMaxReasonBytes) +
-                      "); all surfaces are white");
+    warnings_.add({"unusable-materials", path_,
+                   "its materials cannot be used (" + printable(errors, kMaxReasonBytes) +
+                       "); all surfaces are white"});
   }
   model_->images = std::move(images);
   document.model = std::move(model_);
   document.image_uris = std::move(image_uris_);
+  document.material_warnings = std::move(warnings_);
   document.model_charge = std::move(model_charge_);
   parse_charge_ = {};
 }

@@ -7,9 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "core/base/warning.h"
 #include "scene/gltf/document/document.h"
 #include "scene/gltf/json/element_text.h"
 #include "scene/gltf/json/json_element.h"
+#include "scene/gltf/json/material_members.h"
 
 namespace voxdag::gltf {
 
@@ -18,21 +20,37 @@ class ModelReader {
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
   // Each function appends an element to the JSON text that parse() passes to tinygltf, or to the
-  // images. Throws Error{kOutOfMemory} if the model would not fit the budget.
+  // images. Broken members are left out, with a warning for parse(). Throws Error{kOutOfMemory} if
+  // the model would not fit the budget.
   void add_material(const ElementText& element);
   void add_texture(const ElementText& element);
   void add_sampler(const ElementText& element);
   void add_image(const JsonElement& element);
 
-  // Sets the model of the document and its image_uris. Materials, textures and samplers that
-  // tinygltf refuses are left out with a warning. Call it once, after all elements were added.
+  // Adds a warning that a section cannot be read.
+  void add_violation(const std::string& message);
+
+  // Sets the model of the document, its image_uris and its material_warnings. Materials, textures
+  // and samplers that tinygltf refuses are left out with a warning. Call it once, after all
+  // elements were added.
   void parse(Document& document);
 
  private:
-  // Appends the element to `section`. `bytes` is its size in the array of tinygltf's model.
-  void add(std::string& section, const ElementText& element, uint64_t bytes);
+  struct Section {
+    MaterialSection kind;
+    const char* element;  // "material"
+    std::string text;     // elements with commas between them
+    int count = 0;
+  };
 
-  std::string materials_, textures_, samplers_;  // elements with commas between them
+  // Appends the element to `section`. `bytes` is its size in the array of tinygltf's model.
+  void add(Section& section, const ElementText& element, uint64_t bytes);
+
+  const std::string path_;
+  Section materials_{MaterialSection::kMaterials, "material", {}};
+  Section textures_{MaterialSection::kTextures, "texture", {}};
+  Section samplers_{MaterialSection::kSamplers, "sampler", {}};
+  WarningList warnings_;
   std::shared_ptr<tinygltf::Model> model_;
   std::vector<RawString> image_uris_;
   GrowingCharge model_charge_;

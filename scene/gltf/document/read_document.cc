@@ -132,7 +132,7 @@ std::string read_structure(const ReadableFile& file, FileRange json, Document& d
        {"scenes", kArray, kChecked, store(d, d.scenes, read_scene)},
        {"scene", kWhole, kChecked,
         [&](const JsonElement& element) { d.scene = element.as_index(); }}},
-      budget, cancel);
+      [&](const std::string& message) { model.add_violation(message); }, budget, cancel);
   return violation.empty() && !has_asset ? "asset is missing, expected an object with version 2.0"
                                          : violation;
 }

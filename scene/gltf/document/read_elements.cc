@@ -15,11 +15,10 @@ int index_or_none(const JsonElement& object, const char* key) {
   return member ? member->as_index() : -1;
 }
 
-// Returns the index, or -1 for a value that is not an index. Used for members that do not affect
-// the geometry.
-int index_if_any(const JsonElement& element) {
+// Returns the index of a material. A value that is not an index does not affect the geometry.
+int material_index(const JsonElement& element) {
   const auto number = element.whole_number();
-  return number && *number <= INT32_MAX ? static_cast<int>(*number) : -1;
+  return number && *number <= INT32_MAX ? static_cast<int>(*number) : Primitive::kBrokenMaterial;
 }
 
 uint64_t size_or_zero(const JsonElement& object, const char* key) {
@@ -83,7 +82,7 @@ Primitive read_primitive(const JsonElement& element) {
   out.position = index_or_none(attributes, "POSITION");
   out.indices = index_or_none(element, "indices");
   if (const auto mode = element.find("mode")) out.mode = mode->as_index();
-  if (const auto material = element.find("material")) out.material = index_if_any(*material);
+  if (const auto material = element.find("material")) out.material = material_index(*material);
   out.color = index_or_none(attributes, "COLOR_0");
   for (size_t n = 0;; ++n) {
     const int set = index_or_none(attributes, ("TEXCOORD_" + std::to_string(n)).c_str());

@@ -32,10 +32,12 @@ constexpr uint64_t kGrowingCopies = 2;
 class SectionParser : public nlohmann::json_sax<Json> {
  public:
   SectionParser(const std::string& path, const JsonWindow& window,
-                const std::vector<JsonSection>& sections, MemoryBudget& budget)
+                const std::vector<JsonSection>& sections,
+                const std::function<void(const std::string&)>& ignore, MemoryBudget& budget)
       : path_(path),
         window_(window),
         sections_(sections),
+        ignore_(ignore),
         charge_(budget, "an element in the JSON of " + path) {}
 
   const std::string& violation() const { return violation_; }
@@ -199,12 +201,16 @@ class SectionParser : public nlohmann::json_sax<Json> {
     }
   }
   void violate(const std::string& message) {
-    if (violation_.empty() && (!in_root_ || section_->is_checked)) violation_ = message;
+    if (in_root_ && !section_->is_checked)
+      ignore_(message);
+    else if (violation_.empty())
+      violation_ = message;
   }
 
   const std::string& path_;
   const JsonWindow& window_;
   const std::vector<JsonSection>& sections_;
+  const std::function<void(const std::string&)>& ignore_;
   // Charge for the largest element so far. It never shrinks, because the allocator may retain the
   // memory.
   GrowingCharge charge_;
@@ -230,10 +236,11 @@ class SectionParser : public nlohmann::json_sax<Json> {
 }  // namespace
 
 std::string read_sections(const ReadableFile& file, FileRange json,
-                          const std::vector<JsonSection>& sections, MemoryBudget& budget,
-                          const CancelToken& cancel) {
+                          const std::vector<JsonSection>& sections,
+                          const std::function<void(const std::string&)>& ignore,
+                          MemoryBudget& budget, const CancelToken& cancel) {
   JsonWindow window(file, json, budget, cancel);
-  SectionParser parser(file.path(), window, sections, budget);
+  SectionParser parser(file.path(), window, sections, ignore, budget);
   std::istream text(&window);
   Json::sax_parse(text, &parser);
   return parser.violation();

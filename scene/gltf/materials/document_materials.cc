@@ -17,6 +17,7 @@ namespace {
 class MaterialResolver {
  public:
   explicit MaterialResolver(Document& document) : document_(document) {
+    result_.warnings = document.material_warnings;
     const auto count = static_cast<int>(document.model->materials.size());
     for (int i = 0; i < count; ++i) add_material(i);
   }
@@ -42,6 +43,9 @@ class MaterialResolver {
     if (!source.problem.empty())
       warn("unusable-texture", "material " + numbered(index, source.material.name),
            source.problem + "; its base color factor is used alone");
+    if (!source.sampler_problem.empty())
+      warn("broken-material", "material " + numbered(index, source.material.name),
+           source.sampler_problem + "; the image is repeated");
     if (source.image >= 0) {
       const auto found = std::ranges::find(result_.images, source.image);
       source.material.image = static_cast<uint32_t>(found - result_.images.begin());
@@ -75,6 +79,10 @@ class MaterialResolver {
         warn("missing-material", where_,
              "material " + std::to_string(primitive.material) +
                  " does not exist; the primitive is white");
+      else if (primitive.material == Primitive::kBrokenMaterial)
+        warn("missing-material", where_,
+             "its material is not a whole number, expected the index of a material; the primitive "
+             "is white");
       surface.material = plain_material();
     }
     place_draco_surface(document_, primitive, set);

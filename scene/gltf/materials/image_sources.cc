@@ -71,7 +71,7 @@ void find(FileSystem& files, const ReadableFile& scene_file, const Document& d, 
     else
       set_external(files, d.path, image.uri, "the image", out);
   } else if (image.bufferView < 0) {
-    out.problem = "has neither uri nor bufferView";
+    out.problem = "has no valid uri or bufferView";
   } else if (static_cast<size_t>(image.bufferView) >= d.views.size()) {
     out.problem = "is in bufferView " + std::to_string(image.bufferView) + ", which does not exist";
   } else {

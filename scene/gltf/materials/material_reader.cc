@@ -113,7 +113,12 @@ void read_texture(const tinygltf::Model& model, const TextureUse& use, const cha
   out.image = image;
   out.texcoord = use.texcoord;
   out.transform = use.transform;
-  if (!exists(model.samplers, texture.sampler)) return;
+  if (!exists(model.samplers, texture.sampler)) {
+    if (texture.sampler >= 0)
+      out.sampler_problem =
+          name + " has sampler " + std::to_string(texture.sampler) + ", which does not exist";
+    return;
+  }
   const tinygltf::Sampler& sampler = model.samplers[static_cast<size_t>(texture.sampler)];
   out.material.wrap = {wrap_of(sampler.wrapS), wrap_of(sampler.wrapT)};
 }

@@ -147,6 +147,9 @@ class Preparation {
     const CutoutRule rule = spec_.geometry.cutouts;
     if (rule == CutoutRule::kDefault) return;
     const SceneMaterials materials = scene_.open().materials();
+    // With attributes, the color stage reports these warnings.
+    if (rule == CutoutRule::kSkip && !spec_.geometry.attributes.any())
+      warnings = materials.warnings;
     if (!may_have_cutouts(materials)) return;
     if (rule == CutoutRule::kKeep) {
       warn_of_kept_cutouts(count_cutout_materials(materials), warnings);
@@ -156,7 +159,7 @@ class Preparation {
     Cutouts found = voxdag::find_cutouts(context_.files, materials, spec_.run.threads, budget_,
                                          context_.cancel, problems);
     // With colors, the color stage reports unreadable images.
-    if (!spec_.geometry.attributes.use_images()) warnings = std::move(problems);
+    if (!spec_.geometry.attributes.use_images()) warnings.add(problems.list());
     cutouts_.emplace(std::move(found));
   }
   void warn_of_kept_cutouts(uint64_t materials, WarningList& warnings) const {

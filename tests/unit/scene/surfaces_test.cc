@@ -9,6 +9,8 @@
 namespace voxdag::test {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 Json& only_primitive(SceneBuilder& scene) { return scene.root["meshes"][0]["primitives"][0]; }
@@ -372,6 +374,91 @@ TEST(Materials, NumbersOfThoseThatAreNotListed) {
   for (const SurfaceTriangle& triangle : surfaces_of(*open.source))
     numbers.push_back(scene_materials.materials.at(triangle.material).number);
   EXPECT_EQ(numbers, (std::vector<uint32_t>{0, 1, 0}));
+}
+
+// Each broken member of a material, texture or sampler gives one warning with its place, and counts
+// as missing.
+TEST(Materials, BrokenMembersAreNamedAndIgnored) {
+  const std::pair<Json, const char*> cases[] = {
+      {{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0, 0}}}}},
+       "pbrMetallicRoughness.baseColorFactor is an array of 3 numbers, expected an array of four "
+       "numbers; it is ignored"},
+      {{{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0, "0", 1}}}}},
+       "pbrMetallicRoughness.baseColorFactor is an array of 4 values that are not all numbers"},
+      {{{"pbrMetallicRoughness", {{"baseColorFactor", 1}}}}, "baseColorFactor is 1, expected"},
+      {{{"pbrMetallicRoughness", 3}}, "pbrMetallicRoughness is 3, expected an object"},
+      {{{"pbrMetallicRoughness", Json::array()}}, "pbrMetallicRoughness is an array of 0 numbers"},
+      {{{"pbrMetallicRoughness", {{"baseColorTexture", 0}}}}, "baseColorTexture is 0, expected an"},
+      {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", -1}}}}}},
+       "baseColorTexture.index is -1, expected a whole number from 0 to 2147483647"},
+      {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"texCoord", 0}}}}}},
+       "baseColorTexture.index is missing, but glTF requires it"},
+      {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}, {"texCoord", "1"}}}}}},
+       "baseColorTexture.texCoord is \"1\", expected"},
+      {{{"pbrMetallicRoughness",
+         {{"baseColorTexture",
+           {{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"scale", 2}}}}}}}}}},
+       "KHR_texture_transform.scale is 2, expected an array of two numbers"},
+      {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 8}}}}}},
+       "its base color texture 8 does not exist"},
+      {{{"alphaMode", "FOO"}}, "alphaMode is \"FOO\", expected OPAQUE, MASK or BLEND"},
+      {{{"alphaMode", "mask"}}, "alphaMode is \"mask\""},
+      {{{"alphaMode", 1}}, "alphaMode is 1"},
+      {{{"alphaCutoff", "x"}}, "alphaCutoff is \"x\", expected a number"},
+      {{{"alphaCutoff", nullptr}}, "alphaCutoff is null, expected a number"},
+      {{{"emissiveFactor", {1, 1}}}, "emissiveFactor is an array of 2 numbers"},
+      {{{"emissiveTexture", {{"index", 0.5}}}}, "emissiveTexture.index is 0.5"},
+      {{{"extensions", 0}}, "extensions is 0, expected an object"},
+      {{{"extensions", {{"KHR_materials_unlit", true}}}}, "KHR_materials_unlit is true"},
+      {{{"extensions", {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseFactor", "red"}}}}}},
+       "extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor is \"red\""},
+      {{{"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", "1"}}}}}},
+       "emissiveStrength is \"1\""},
+  };
+  for (const auto& [members, message] : cases) {
+    SceneBuilder scene = textured("");
+    scene.root["materials"][0] = members;
+    scene.root["materials"][0]["name"] = "leaf";
+    OpenScene open(scene.glb());
+    const auto warnings = texts_of(open.source->materials().warnings.list());
+    ASSERT_EQ(warnings.size(), 1u) << members;
+    EXPECT_THAT(warnings[0],
+                AllOf(HasSubstr("folder/scene: material 0 \"leaf\": "), HasSubstr(message)));
+    const Material material = open.source->materials().materials[0];
+    EXPECT_EQ(material.factor, (Channels{65535, 65535, 65535, 65535})) << members;
+    EXPECT_EQ(material.alpha_mode, AlphaMode::kOpaque);
+    EXPECT_TRUE(open.source->warnings().empty());
+  }
+}
+
+TEST(Materials, BrokenTexturesSamplersAndIndices) {
+  const auto warnings_of = [](const auto& change) {
+    SceneBuilder scene = textured("");
+    change(scene.root);
+    OpenScene open(scene.glb());
+    EXPECT_EQ(open.triangles().size(), 1u);
+    return texts_of(open.source->materials().warnings.list());
+  };
+  EXPECT_THAT(warnings_of([](Json& root) {
+                root["textures"][0] = {{"sampler", -1}, {"source", 0}};
+              }),
+              ElementsAre(HasSubstr("folder/scene: texture 0: sampler is -1, expected a whole")));
+  EXPECT_THAT(warnings_of([](Json& root) { root["textures"][0]["sampler"] = 5; }),
+              ElementsAre(HasSubstr("base color texture 0 has sampler 5, which does not exist")));
+  EXPECT_THAT(warnings_of([](Json& root) {
+                root["samplers"] = {{{"wrapS", 1}}};
+              }),
+              ElementsAre(HasSubstr("sampler 0: wrapS is 1, expected 33071, 33648 or 10497")));
+  EXPECT_THAT(warnings_of([](Json& root) { root["samplers"] = {7}; }),
+              ElementsAre(HasSubstr("sampler 0: is 7, expected an object")));
+  EXPECT_THAT(warnings_of([](Json& root) { root["samplers"] = Json::object(); }),
+              ElementsAre(HasSubstr("samplers is an object, expected an array; it is ignored")));
+  EXPECT_THAT(warnings_of([](Json& root) { root["textures"][0]["source"] = "wood"; }),
+              ElementsAre(HasSubstr("source is \"wood\""), HasSubstr("texture 0 has no image")));
+  for (const Json& index : {Json(-1), Json("leaf"), Json(0.5)})
+    EXPECT_THAT(
+        warnings_of([&](Json& root) { root["meshes"][0]["primitives"][0]["material"] = index; }),
+        ElementsAre(HasSubstr("mesh 0: primitive 0: its material is not a whole number")));
 }
 
 }  // namespace

@@ -1,0 +1,23 @@
+// Checks the members of materials, textures and samplers that voxdag reads. tinygltf ignores
+// members of a wrong type without a message.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "scene/gltf/json/element_text.h"
+
+namespace voxdag::gltf {
+
+// The three sections of a file that tinygltf parses.
+enum class MaterialSection { kMaterials, kTextures, kSamplers };
+
+// Receives the name of the element ("" if it has none), and a message about one of its members.
+using ReportMember = std::function<void(const std::string& name, const std::string& message)>;
+
+// Returns the JSON text of the element without the members that break a rule of glTF, and reports
+// each of them. An element that is not an object becomes {}.
+std::string without_broken_members(MaterialSection section, const ElementText& element,
+                                   const ReportMember& report);
+
+}  // namespace voxdag::gltf
