@@ -89,7 +89,7 @@ struct BuildOptions {
   bool restart = false;      // discard the job in the work folder and start over
   bool force = false;        // build although the estimate predicts a lack of memory or disk space
   bool strict = false;       // throw Error{kInvalidInput} for a warning about the scene
-  bool allow_empty = false;  // build a scene without triangles in the grid instead of refusing it
+  bool allow_empty = false;  // write a file without voxels instead of refusing the scene
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache
   uint64_t cache_bytes = uint64_t{16} << 30;  // maximum size of the cache folder
 

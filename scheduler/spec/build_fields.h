@@ -138,8 +138,7 @@ void fields(Visitor& visit, RunOptions& r) {
             .from(Scope::kPlan),
         r.work_folder);
   visit(option("strict", "treat warnings about the scene as errors"), r.strict);
-  visit(option("allow_empty", "write a file without voxels if no triangle is in the grid"),
-        r.allow_empty);
+  visit(option("allow_empty", "write a file without voxels if the scene sets none"), r.allow_empty);
   visit(of_build("cache", "folder in which builds share subvolumes").path(), r.cache_folder);
   visit(of_build("cache_size", "limit of the cache folder").bytes(), r.cache_bytes);
   visit(of_build("keep_work", "do not remove the work folder"), r.keep_work);

@@ -127,7 +127,7 @@ struct RunOptions {
   bool restart = false;      // discard the job in the work folder and start over
   bool force = false;        // build even if the estimate does not fit
   bool strict = false;       // treat warnings about the scene as errors
-  bool allow_empty = false;  // build a scene without triangles in the grid instead of refusing it
+  bool allow_empty = false;  // write a file without voxels instead of refusing the scene
   std::optional<ClusterOptions> cluster;
 };
 

@@ -63,6 +63,27 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
   return artifacts;
 }
 
+namespace {
+
+// Called for a scene whose triangles set no voxel. Throws Error{kInvalidInput}, or only warns with
+// --allow-empty.
+void check_voxels(const BuildJob& job) {
+  const GeometryOptions& geometry = job.spec.geometry;
+  std::string message = "none of the " + std::to_string(job.report.triangles) +
+                        " triangles near the grid sets a voxel";
+  if (geometry.thin) message += ", because --thin leaves out triangles between the rows";
+  if (geometry.cutouts == CutoutRule::kSkip)
+    message += ", because --cutouts skip leaves out surfaces that alpha hides";
+  const std::string& scene = geometry.scenes.front();
+  if (!job.spec.run.allow_empty)
+    throw Error(ErrorCode::kInvalidInput,
+                scene + ": " + message + "; --allow-empty writes a file without voxels");
+  job.context.progress.warn_of_input(
+      {"no-voxels", scene, message + "; the file will have no nodes"});
+}
+
+}  // namespace
+
 void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
   BuildReport& report = job.report;
   MergeInputs inputs;
@@ -80,11 +101,7 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
   report.merge = merge_sub_dags(inputs, job.context.files, out, job.budget, report.threads,
                                 job.context.progress, job.context.cancel, &checkpoint);
   report.spill_bytes += report.merge.scratch_bytes;
-  if (report.merge.voxels == 0 && report.triangles > 0)
-    job.context.progress.warn_of_input(
-        {"no-voxels", job.spec.geometry.scenes.front(),
-         "none of the " + std::to_string(report.triangles) +
-             " triangles near the grid sets a voxel: the file will have no nodes"});
+  if (report.merge.voxels == 0 && report.triangles > 0) check_voxels(job);
   job.clock.finish("merge");
 }
 

@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "scheduler/run_build.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/unit/scene/scene_files.h"
 
 namespace voxdag {
 namespace {
@@ -108,6 +109,36 @@ TEST_F(SceneWarnings, AnEmptySceneIsAnErrorThatSaysWhy) {
   EXPECT_THAT(message(), HasSubstr("1 triangles, all outside the grid"));
   spec_.run.allow_empty = true;
   EXPECT_EQ(build().warnings.back().code, "empty-scene");
+}
+
+// A scene whose triangles set no voxel is an error as well.
+TEST_F(SceneWarnings, AVanishedSceneIsAnErrorThatSaysWhy) {
+  write_scene("3 0 0 1\n", 1);
+  spec_.geometry.thin = true;
+  EXPECT_THAT(message(), HasSubstr("sets a voxel, because --thin leaves out triangles"));
+  spec_.run.allow_empty = true;
+  EXPECT_EQ(build().warnings.back().code, "no-voxels");
+}
+
+// A broken alpha mode gives a warning, and hides nothing. A cutoff above 1 hides the scene.
+TEST_F(SceneWarnings, AlphaThatHidesTheScene) {
+  test::SceneBuilder scene = test::one_triangle();
+  scene.root["meshes"][0]["primitives"][0]["material"] = 0;
+  const auto write = [&](const char* mode) {
+    scene.root["materials"] = {{{"alphaMode", mode}, {"alphaCutoff", 2}}};
+    spec_.geometry.scenes = {folder_.file("mesh.glb")};
+    std::ofstream(spec_.geometry.scenes[0]) << scene.glb();
+  };
+  spec_.geometry.cutouts = CutoutRule::kSkip;
+  write("mask");
+  const std::vector<Warning> warnings = build().warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].code, "broken-material");
+  spec_.run.restart = true;
+  write("MASK");
+  EXPECT_THAT(message(), HasSubstr("sets a voxel, because --cutouts skip leaves out surfaces"));
+  spec_.run.allow_empty = true;
+  EXPECT_EQ(build().warnings.back().code, "no-voxels");
 }
 
 }  // namespace
