@@ -11,13 +11,16 @@
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "core/format/global/open_global.h"
+#include "query/export/chunks/export_chunks.h"
 
 namespace voxdag::cli {
 namespace {
 
 struct ExportCommand {
-  std::string input, format, output, memory;
+  std::string input, format, output, memory, up;
   SelectionOptions selection;
+  query::ExportOptions options;
+  uint64_t chunks = 0, levels = 1;
   bool gray = false, force = false, quiet = false, json = false;
 };
 
@@ -29,6 +32,37 @@ void print(const query::ExportReport& report, double wall_s) {
   for (const std::string& note : report.notes) std::printf("  %s\n", printable_line(note).c_str());
 }
 
+void print_chunks(const ExportCommand& command, const query::ChunksReport& report, double wall_s) {
+  if (command.json)
+    return print_json(nlohmann::ordered_json{{"format", command.format},
+                                             {"manifest", report.manifest},
+                                             {"chunks", report.chunks},
+                                             {"bytes", report.bytes},
+                                             {"voxels", report.voxels},
+                                             {"peak_rss_bytes", peak_resident_bytes()},
+                                             {"wall_s", wall_s}});
+  std::printf("%s: %s chunks, %s, %s voxels, %s\n", printable_line(report.manifest).c_str(),
+              count_text(report.chunks).c_str(), size_text(report.bytes).c_str(),
+              count_text(report.voxels).c_str(), duration_text(wall_s).c_str());
+}
+
+// Returns the facts as members: a number, or a list of numbers. Whole numbers have no fraction.
+nlohmann::ordered_json facts_json(const query::ExportReport& report) {
+  const auto number = [](double value) {
+    const auto whole = static_cast<int64_t>(value);
+    return static_cast<double>(whole) == value ? nlohmann::ordered_json(whole)
+                                               : nlohmann::ordered_json(value);
+  };
+  auto facts = nlohmann::ordered_json::object();
+  for (const auto& [name, numbers] : report.facts) {
+    if (numbers.size() == 1)
+      facts[name] = number(numbers[0]);
+    else
+      for (const double value : numbers) facts[name].push_back(number(value));
+  }
+  return facts;
+}
+
 void run(const ExportCommand& command, CommandContext& context) {
   query::ExportRequest request;
   request.format = &query::export_format(command.format);
@@ -36,10 +70,19 @@ void run(const ExportCommand& command, CommandContext& context) {
   request.memory_bytes = memory_limit(command.memory);
   request.gray = command.gray;
   request.replace = command.force;
+  request.options = command.options;
+  if (!command.up.empty())
+    request.options.up = command.up == "z" ? query::UpAxis::kZ : query::UpAxis::kY;
   const auto progress = make_progress_bar(command.quiet);
   const auto file = open_global_file(command.input);
   request.selection = command.selection.selection(*file);
   const double start_s = wall_seconds();
+  if (command.chunks > 0)
+    return print_chunks(
+        command,
+        query::export_chunks(context.files, *file, {request, command.chunks, command.levels},
+                             *progress, context.cancel),
+        wall_seconds() - start_s);
   const query::ExportReport report =
       query::export_dag(context.files, *file, request, *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
@@ -49,6 +92,7 @@ void run(const ExportCommand& command, CommandContext& context) {
                                     {"bytes", report.bytes},
                                     {"voxels", report.voxels},
                                     {"notes", report.notes},
+                                    {"facts", facts_json(report)},
                                     {"peak_rss_bytes", peak_resident_bytes()},
                                     {"wall_s", wall_s}});
 }
@@ -68,6 +112,27 @@ void declare(Command& command, ExportCommand& state) {
   command.option("--memory", state.memory,
                  "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
+  command
+      .option("--up", state.up,
+              "axis of the exported file that gets the y axis of the scene (default: z for vox, "
+              "otherwise y)")
+      .one_of({"y", "z"});
+  command.option("--grid", state.options.grid,
+                 "vdb, nvdb: density (default), a fog volume, or mask, which is smaller");
+  const Option chunks_option =
+      command
+          .option("--chunks", state.chunks,
+                  "N: write a file for each cube of N voxels per edge that has voxels, into the "
+                  "folder -o, and manifest.json")
+          .positive();
+  command
+      .option("--levels", state.levels,
+              "with --chunks: also write the chunks of coarser levels, together this number "
+              "(default: 1)")
+      .positive()
+      .needs(chunks_option);
+  command.flag("--compact", state.options.compact,
+               "npz: leave out the arrays that can be computed from the others");
   command.flag("--force", state.force, "replace existing files");
   command.quiet_flag(state.quiet);
   command.json_flag(state.json);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 
 namespace voxdag {
 
@@ -31,10 +32,10 @@ bool MemoryBudget::try_charge(uint64_t bytes) {
 
 void MemoryBudget::charge(uint64_t bytes, std::string_view what) {
   if (try_charge(bytes)) return;
-  throw Error(ErrorCode::kOutOfMemory,
-              "out of memory: " + std::string(what) + " needs " + std::to_string(bytes) +
-                  " bytes, " + std::to_string(available()) + " of a budget of " +
-                  std::to_string(limit_) + " are free: expected a larger memory budget (--memory)");
+  throw Error(ErrorCode::kOutOfMemory, "out of memory: " + std::string(what) + " needs " +
+                                           size_text(bytes) + ", " + size_text(available()) +
+                                           " of a budget of " + size_text(limit_) +
+                                           " are free: expected a larger memory budget (--memory)");
 }
 
 void MemoryBudget::release(uint64_t bytes) {

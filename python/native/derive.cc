@@ -65,10 +65,29 @@ std::string extract(const PathText& path, const PathText& output, uint32_t grid_
   });
 }
 
+query::ExportOptions export_options(const nlohmann::json& given) {
+  query::ExportOptions options;
+  const std::string up = given.value("up", "");
+  if (up == "y") options.up = query::UpAxis::kY;
+  if (up == "z") options.up = query::UpAxis::kZ;
+  options.grid = given.value("grid", "");
+  options.compact = given.value("compact", false);
+  return options;
+}
+
+nlohmann::json facts_json(const query::ExportReport& report) {
+  auto facts = nlohmann::json::object();
+  for (const auto& [name, numbers] : report.facts)
+    facts[name] = numbers.size() == 1 ? nlohmann::json(numbers[0]) : nlohmann::json(numbers);
+  return facts;
+}
+
 std::string export_file(const PathText& path, const PathText& output, const std::string& format,
                         uint32_t grid_levels, const Corner& low, const Corner& high,
-                        const std::string& memory, bool gray, bool replace, nb::object progress) {
+                        const std::string& memory, bool gray, bool replace,
+                        const std::string& options_text, nb::object progress) {
   query::ExportRequest request;
+  request.options = export_options(nlohmann::json::parse(options_text));
   request.gray = gray;
   request.replace = replace;
   request.format = &query::export_format(format);
@@ -79,8 +98,10 @@ std::string export_file(const PathText& path, const PathText& output, const std:
     const auto file = open_global_file(path.bytes);
     const query::ExportReport report =
         query::export_dag(system_files(), *file, request, relay, cancel);
-    return nlohmann::json{
-        {"bytes", report.bytes}, {"voxels", report.voxels}, {"notes", report.notes}}
+    return nlohmann::json{{"bytes", report.bytes},
+                          {"voxels", report.voxels},
+                          {"notes", report.notes},
+                          {"facts", facts_json(report)}}
         .dump();
   });
 }
@@ -139,7 +160,7 @@ void bind_derive(nb::module_& module) {
              nb::arg("memory"), nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export", &export_file, nb::arg("path"), nb::arg("output"), nb::arg("format"),
              nb::arg("grid_levels"), nb::arg("low"), nb::arg("high"), nb::arg("memory"),
-             nb::arg("gray"), nb::arg("replace"), nb::arg("progress").none());
+             nb::arg("gray"), nb::arg("replace"), nb::arg("options"), nb::arg("progress").none());
   module.def("combine", &combine, nb::arg("a"), nb::arg("b"), nb::arg("operation"),
              nb::arg("output"), nb::arg("offset").none(), nb::arg("clip"), nb::arg("memory"),
              nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());

@@ -83,6 +83,9 @@ def export(
     world: bool = False,
     memory: Union[int, str, None] = None,
     gray: bool = False,
+    up: Optional[str] = None,
+    grid: Optional[str] = None,
+    compact: bool = False,
     force: bool = False,
     progress: Progress = None,
 ) -> ExportReport:
@@ -98,6 +101,11 @@ def export(
     memory                memory limit, as a number of bytes or as text such as "8GiB". The default
                           is half of the machine's memory.
     gray                  if True, omits the colors of the file
+    up                    "y" or "z": the axis of the exported file that gets the y axis of the
+                          .vdag file. The default is "z" for vox, and "y" for the other formats.
+    grid                  for vdb and nvdb: "density" (the default) or "mask"
+    compact               for npz: if True, omits the positions, which can be computed from the
+                          cells
     force                 if True, replaces existing files
     progress              as in build()
 
@@ -106,6 +114,9 @@ def export(
     """
     path, output = path_text(path), path_text(output)
     to = _format_of(output) if to is None else to
+    if up not in (None, "y", "z"):
+        raise Error(f"up={up!r}: expected 'y' or 'z'", "invalid_input")
+    options = json.dumps({"up": up or "", "grid": grid or "", "compact": bool(compact)})
     files = _native.export_paths(to, output)
     _check_output(path, files, force)
     with Dag(path) as dag:
@@ -113,7 +124,7 @@ def export(
         levels = dag._levels(level)
     with shown(progress) as callback:
         report = _native.export(
-            path, output, to, levels, low, high, memory_text(memory), gray, force, callback
+            path, output, to, levels, low, high, memory_text(memory), gray, force, options, callback
         )
     return cast(ExportReport, {"files": files, **json.loads(report)})
 

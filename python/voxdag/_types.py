@@ -114,12 +114,14 @@ class ExportReport(TypedDict):
     bytes    total size of the files in bytes
     voxels   number of exported voxels
     notes    list of sentences on how to use the files
+    facts    dict of the numbers in the notes. A value is a number, or a list of three numbers.
     """
 
     files: list[str]
     bytes: int
     voxels: int
     notes: list[str]
+    facts: dict[str, float | list[float]]
 
 
 class ExtractOptions(TypedDict, total=False):
@@ -145,6 +147,9 @@ class ExportOptions(TypedDict, total=False):
     world: bool
     memory: int | str | None
     gray: bool
+    up: str | None
+    grid: str | None
+    compact: bool
     force: bool
     progress: Progress
 

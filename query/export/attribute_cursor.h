@@ -23,10 +23,11 @@ class AttributeCursor {
   const AttributeTraits& traits() const { return traits_; }
   const EncodingTraits& encoding() const { return traits_of(traits_.encoding); }
 
-  // Calls put(number) for each component of the value of `cell`, a set cell of the selection's
-  // grid. Throws Error{kCorrupt}.
+  // Calls put(number) for each component of the value of a set cell of the selection's grid,
+  // in turned axes. Throws Error{kCorrupt}.
   template <class Put>
-  void put(const std::array<int64_t, 3>& cell, const Put& put) {
+  void put(const std::array<int64_t, 3>& turned_cell, const Put& put) {
+    const Position cell = job_.original(turned_cell);
     uint64_t i = 0;
     const voxdag_reader::ColorRegion* const region = with_reader_errors(
         [&] { return cursor_.find(cell[0], cell[1], cell[2], job_.selection.grid_levels, i); });
@@ -34,10 +35,22 @@ class AttributeCursor {
       throw Error(ErrorCode::kCorrupt, job_.file.path() + ": " + cell_text(job_, cell) +
                                            " has no " + traits_.name +
                                            ": the file is damaged (voxdag verify reports where)");
-    put_value(traits_.attribute, *region, i, put);
+    if (traits_.encoding == Encoding::kOctahedral && !job_.turn.is_none())
+      put_turned(region->normal(i), put);
+    else
+      put_value(traits_.attribute, *region, i, put);
   }
 
  private:
+  template <class Put>
+  void put_turned(const voxdag_reader::Normal& normal, const Put& put) const {
+    const std::array<float, 3> original = {normal.x, normal.y, normal.z};
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const float component = original[job_.turn.from[axis]];
+      put(job_.turn.reversed[axis] ? -component : component);
+    }
+  }
+
   const ExportJob& job_;
   const AttributeTraits& traits_;
   voxdag_reader::ColorCursor cursor_;

@@ -1,12 +1,15 @@
 #include "query/export/export.h"
 
-#include <array>
+#include <string>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "query/dag/locked_outputs.h"
+#include "query/export/dag_export.h"
 #include "query/export/export_job.h"
+#include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
@@ -18,20 +21,27 @@ constexpr ExportFormat kFormats[] = {
      write_svdag},
     {"voxel", "PlayCanvas and SuperSplat: NAME.voxel.json and NAME.voxel.bin", ".voxel.json",
      ".voxel.bin", write_voxel},
-    {"vox", "MagicaVoxel", nullptr, nullptr, write_vox},
+    {"vox", "MagicaVoxel", nullptr, nullptr, write_vox, UpAxis::kZ},
     {"bt", "OctoMap", nullptr, nullptr, write_bt},
 #ifdef VOXDAG_HAS_VDB
-    {"vdb", "OpenVDB: Blender, Houdini", nullptr, nullptr, write_vdb},
-    {"nvdb", "NanoVDB: renderers on GPUs", nullptr, nullptr, write_nvdb},
+    {"vdb", "OpenVDB: Blender, Houdini", nullptr, nullptr, write_vdb, UpAxis::kY, " grid"},
+    {"nvdb", "NanoVDB: renderers on GPUs", nullptr, nullptr, write_nvdb, UpAxis::kY, " grid"},
 #endif
     {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
-    {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz},
+    {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz,
+     UpAxis::kY, " compact"},
     {"vtu", "VTK, ParaView: a hexahedron for each voxel, with shared points", nullptr, nullptr,
      write_vtu},
     {"inp", "Abaqus, CalculiX: an element C3D8 for each voxel, with shared nodes", nullptr, nullptr,
      write_inp},
     {"glb", "glTF: a mesh of the surface, for regions", nullptr, nullptr, write_glb},
 };
+
+// Returns the turn from the axes that the format's writer gets by default to the requested ones.
+AxisTurn turn_of(const ExportFormat& format, UpAxis up) {
+  if (up == UpAxis::kOfFormat || up == format.up) return {};
+  return up == UpAxis::kZ ? kTurnYToZ : kTurnZToY;
+}
 
 }  // namespace
 
@@ -51,6 +61,22 @@ const ExportFormat& export_format(const std::string& name) {
   throw Error(ErrorCode::kInvalidInput, "--to " + name + ": expected one of " + names);
 }
 
+void check_export_options(const ExportFormat& format, const ExportOptions& options) {
+  const std::pair<const char*, bool> given[] = {{"grid", !options.grid.empty()},
+                                                {"compact", options.compact}};
+  for (const auto& [name, is_given] : given) {
+    const auto has = [name = std::string(" ") + name](const ExportFormat& other) {
+      return (other.options + std::string(" ")).find(name + " ") != std::string::npos;
+    };
+    if (!is_given || has(format)) continue;
+    std::string formats;
+    for (const ExportFormat& other : kFormats)
+      if (has(other)) formats += std::string(formats.empty() ? "" : " or ") + other.name;
+    throw Error(ErrorCode::kInvalidInput,
+                "--" + std::string(name) + ": expected --to " + formats + ", not " + format.name);
+  }
+}
+
 std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output) {
   if (!format.suffix) return {output};
   const std::string_view suffix = format.suffix;
@@ -61,26 +87,58 @@ std::vector<std::string> export_paths(const ExportFormat& format, const std::str
   return {output, stem + format.second_suffix};
 }
 
+DagExport::DagExport(const voxdag_reader::File& file, const ExportRequest& request)
+    : file_(file),
+      request_(request),
+      turn_(turn_of(*request.format, request.options.up)),
+      budget_(request.memory_bytes),
+      dag_(file) {
+  check_export_options(*request.format, request.options);
+}
+
+bool DagExport::has_voxels(const Selection& selection) const {
+  bool found = false;
+  for_each_brick(dag_, selection, [&](const Brick&) { return !(found = true); });
+  return found;
+}
+
+ExportReport DagExport::write(FileSystem& files, const Selection& selection,
+                              const std::string& output, Progress& progress,
+                              const CancelToken& cancel) {
+  check_grid(selection, file_.grid_levels());
+  const std::vector<std::string> paths = export_paths(*request_.format, output);
+  LockedOutputs outputs(files, {paths, {file_.path()}, request_.replace});
+  const WatchedFile watched(file_);
+  Selection turned = selection;
+  turned.region = turn_.turned(selection.region, int64_t{1} << selection.grid_levels);
+  const auto write = [&] {
+    if (!turn_.is_none() && !turned_ && !dag_.empty())
+      turned_.emplace(dag_, turn_, file_.path(), budget_, cancel);
+    const ExportJob job{outputs.files(),
+                        file_,
+                        turned_ ? turned_->view() : dag_,
+                        watched,
+                        turned,
+                        output,
+                        paths.back(),
+                        file_.has_colors() && !request_.gray,
+                        budget_,
+                        progress,
+                        cancel,
+                        turn_,
+                        request_.options};
+    if (dag_.empty()) refuse_empty(job);
+    return request_.format->write(job);
+  };
+  ExportReport report = watched.run([&] { return naming_file(file_.path(), write); });
+  report.files = paths;
+  return report;
+}
+
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel) {
-  check_grid(request.selection, file.grid_levels());
-  const std::vector<std::string> paths = export_paths(*request.format, request.output);
-  LockedOutputs outputs(files, {paths, {file.path()}, request.replace});
-  const WatchedFile watched(file);
-  MemoryBudget budget(request.memory_bytes);
-  const bool has_colors = file.has_colors() && !request.gray;
-  const auto write = [&] {
-    const DagView dag(file);
-    const ExportJob job{outputs.files(), file,         dag,        watched, request.selection,
-                        request.output,  paths.back(), has_colors, budget,  progress,
-                        cancel};
-    if (dag.empty()) refuse_empty(job);
-    return request.format->write(job);
-  };
-  ExportReport report = watched.run([&] { return naming_file(file.path(), write); });
-  report.files = paths;
-  return report;
+  return DagExport(file, request).write(files, request.selection, request.output, progress, cancel);
 }
 
 }  // namespace voxdag::query

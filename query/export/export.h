@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/progress.h"
@@ -23,6 +24,21 @@ struct ExportReport {
   uint64_t bytes = 0;              // total size of all files
   uint64_t voxels = 0;
   std::vector<std::string> notes;  // usage notes for the files, one sentence each
+  // The numbers of the notes, by name: one number, or the three numbers of a position.
+  std::vector<std::pair<std::string, std::vector<double>>> facts;
+
+  void add_fact(const char* name, double number) { facts.push_back({name, {number}}); }
+  void add_fact(const char* name, uint64_t number) { add_fact(name, static_cast<double>(number)); }
+};
+
+// The axis of the exported file that gets the y axis of the .vdag file.
+enum class UpAxis { kOfFormat, kY, kZ };
+
+// Options of some formats.
+struct ExportOptions {
+  UpAxis up = UpAxis::kOfFormat;
+  std::string grid;      // vdb, nvdb: density or mask; "" means density
+  bool compact = false;  // npz: only arrays that cannot be computed from the others
 };
 
 struct ExportFormat {
@@ -33,6 +49,8 @@ struct ExportFormat {
   const char* suffix;
   const char* second_suffix;
   ExportReport (*write)(const ExportJob& job);
+  UpAxis up = UpAxis::kY;    // axis that gets the file's y axis by default
+  const char* options = "";  // names of the ExportOptions that the format has, after a space each
 };
 
 // Returns the formats that this build of voxdag supports. A format that needs a missing library is
@@ -45,6 +63,9 @@ const ExportFormat& export_format(const std::string& name);
 // have the suffix that the format needs.
 std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output);
 
+// Throws Error{kInvalidInput} if the format does not have one of the given options.
+void check_export_options(const ExportFormat& format, const ExportOptions& options);
+
 struct ExportRequest {
   const ExportFormat* format = nullptr;
   Selection selection;
@@ -52,6 +73,7 @@ struct ExportRequest {
   uint64_t memory_bytes = 0;  // limit of allocations, not including the mapped file
   bool gray = false;          // no colors in the output
   bool replace = false;       // replace existing files
+  ExportOptions options{};
 };
 
 // Writes the selected voxels. The files get their final names when all of them are complete. After

@@ -32,7 +32,8 @@ void require_space(const ExportJob& job, uint64_t bytes) {
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
   std::string text = "--level " + std::to_string(grid_levels);
   if (job.selects_all_of(job.selection.grid_levels)) return text;
-  const Region region = coarser(job.selection, grid_levels).region;
+  const Region region =
+      job.turn.original(coarser(job.selection, grid_levels).region, int64_t{1} << grid_levels);
   std::string separator = " --region ";
   for (const auto& corner : {region.low, region.high})
     for (const int64_t coordinate : corner) {
@@ -122,7 +123,8 @@ void require_written(const ExportJob& job, uint64_t written, uint64_t expected) 
 }
 
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
-                                 const std::array<int64_t, 3>& cell) {
+                                 const std::array<int64_t, 3>& turned_cell) {
+  const Position cell = job.original(turned_cell);
   const auto color = with_reader_errors(
       [&] { return colors.color(cell[0], cell[1], cell[2], job.selection.grid_levels); });
   if (!color)

@@ -14,30 +14,40 @@
 #include "query/export/export.h"
 #include "query/export/export_file.h"
 #include "query/export/level_cells.h"
+#include "query/export/turn/axis_turn.h"
 
 namespace voxdag::query {
 
 struct ExportJob {
   FileSystem& files;
   const voxdag_reader::File& file;
-  const DagView& dag;  // DAG of the file; not empty
+  const DagView& dag;  // DAG of the file, with turned axes; not empty
   const WatchedFile& watched;
-  Selection selection;
+  Selection selection;  // in turned axes
   std::string output;
   std::string second_output;  // name of the second file, for formats with two files
   bool has_colors;            // write colors, if the format supports them
   MemoryBudget& budget;
   Progress& progress;
   const CancelToken& cancel;
+  AxisTurn turn;
+  ExportOptions options;
 
+  // Returns the coordinate of the grid's low corner on a turned axis, in world space.
+  double origin(size_t axis) const {
+    const double low = file.origin()[turn.from[axis]];
+    return turn.reversed[axis] ? -(low + file.edge()) : low;
+  }
+  // Returns the cell of the file's grid that is at `cell` of the turned grid.
+  Position original(const Position& cell) const {
+    return turn.is_none() ? cell : turn.original(cell, int64_t{1} << selection.grid_levels);
+  }
   // Returns the edge of a cell of the selected grid in world space.
   double cell_edge() const {
     return file.edge() / static_cast<double>(int64_t{1} << selection.grid_levels);
   }
   // Returns the world coordinate of a position along an axis; `cells` is the position in cells.
-  double world(size_t axis, double cells) const {
-    return file.origin()[axis] + cells * cell_edge();
-  }
+  double world(size_t axis, double cells) const { return origin(axis) + cells * cell_edge(); }
   bool selects_all_of(uint32_t grid_levels) const {
     return selection.grid_levels == grid_levels && selection.region == whole_grid(grid_levels);
   }
@@ -91,7 +101,7 @@ class CancelCheck {
 // Returns the same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
 // Returns the command line options for the job's selection on a coarser grid: "--level 11", and
-// also "--region", in cells of that grid, if only a part is selected.
+// also "--region", in cells of that grid and in the file's axes, if only a part is selected.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
 // Publishes the files and returns their total size in bytes. If a part of the input could not be
@@ -143,10 +153,10 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
 // Returns the name of a cell of the selection's grid, for messages.
 std::string cell_text(const ExportJob& job, const std::array<int64_t, 3>& cell);
-// Returns the color of a selected cell, which must be set. Throws Error{kCorrupt} if it has no
-// color.
+// Returns the color of a selected cell (in turned axes), which must be set. Throws Error{kCorrupt}
+// if it has no color.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
-                                 const std::array<int64_t, 3>& cell);
+                                 const std::array<int64_t, 3>& turned_cell);
 
 // The writers, one per format. A writer that needs a missing library is not defined.
 ExportReport write_ply(const ExportJob& job);

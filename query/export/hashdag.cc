@@ -59,8 +59,8 @@ class HashDagWriter {
   }
 
   void write() {
-    for (size_t axis = 0; axis < 3; ++axis) file_.put(job_.file.origin()[axis]);
-    for (size_t axis = 0; axis < 3; ++axis) file_.put(job_.file.origin()[axis] + job_.file.edge());
+    for (size_t axis = 0; axis < 3; ++axis) file_.put(job_.origin(axis));
+    for (size_t axis = 0; axis < 3; ++axis) file_.put(job_.origin(axis) + job_.file.edge());
     file_.put(dag_.grid_levels());
     file_.put(dag_.word_count());
     ExportStage stage(job_, "export", dag_.node_count(), "nodes");
@@ -165,12 +165,17 @@ class HashDagWriter {
   std::vector<uint64_t> enclosed_;
 };
 
+// HashDAG's viewer does not compile for grids of fewer than 2^10 voxels per edge.
+constexpr uint32_t kMinViewerLevels = 10;
+
 std::string scene_depth_note(uint32_t levels) {
+  if (levels < kMinViewerLevels)
+    return "the viewer of HashDAG takes grids of 1024 voxels per edge or more; its loader reads "
+           "this file";
   return "compile the viewer with SCENE_DEPTH " + std::to_string(levels) +
-         ", LOAD_UNCOMPRESSED_COLORS 1 and LOAD_COMPRESSED_COLORS 0" +
-         (levels >= 10 ? ", and name the files data/<SCENE>" + std::to_string(1u << (levels - 10)) +
-                             "k.basic_dag.*"
-                       : "");
+         ", LOAD_UNCOMPRESSED_COLORS 1 and LOAD_COMPRESSED_COLORS 0, and name the files "
+         "data/<SCENE>" +
+         std::to_string(1u << (levels - kMinViewerLevels)) + "k.basic_dag.*";
 }
 
 void require_hashdag_limits(const ExportJob& job, const SelectedDag& dag) {
@@ -210,6 +215,7 @@ ExportReport write_hashdag(const ExportJob& job) {
   ExportFile* const written[] = {&file, &colors};
   report.bytes = publish(job, written);
   report.notes.push_back(scene_depth_note(dag.grid_levels()));
+  report.add_fact("scene_depth", uint64_t{dag.grid_levels()});
   if (dag.voxels() >> 32)
     report.notes.push_back("HashDAG numbers voxels for colors with 32 bits: " +
                            count_text(dag.voxels()) + " voxels have more");

@@ -206,12 +206,15 @@ NumpyType numpy_type(NumberType number) {
   return {"float32", "<f4"};
 }
 
-void add_positions(const ExportJob& job, uint64_t voxels, ExportStage& stage, NpzWriter& writer) {
+void add_cells(const ExportJob& job, uint64_t voxels, ExportStage& stage, NpzWriter& writer) {
   writer.add("cells", "<i4", 3, voxels, [&](const auto& put) {
     visit_cells(job, stage, [&](const Position& cell) {
       for (size_t axis = 0; axis < 3; ++axis) put(static_cast<int32_t>(cell[axis]));
     });
   });
+}
+
+void add_positions(const ExportJob& job, uint64_t voxels, ExportStage& stage, NpzWriter& writer) {
   writer.add("positions", "<f8", 3, voxels, [&](const auto& put) {
     visit_cells(job, stage, [&](const Position& cell) {
       for (size_t axis = 0; axis < 3; ++axis)
@@ -241,18 +244,23 @@ ExportReport write_npz(const ExportJob& job) {
   const uint64_t voxels = require_voxels(job, uint64_t{1} << 48, "an array takes");
   report.voxels = voxels;
   std::vector<AttributeCursor> attributes = exported_attributes(job);
-  const uint64_t voxel_bytes = 3 * (sizeof(int32_t) + sizeof(double)) + decoded_bytes(attributes);
+  const bool has_positions = !job.options.compact;
+  const uint64_t voxel_bytes =
+      3 * (sizeof(int32_t) + has_positions * sizeof(double)) + decoded_bytes(attributes);
   require_space(job, voxels * voxel_bytes + 4096);
   NpzWriter writer(job);
-  ExportStage stage(job, "export", (2 + attributes.size()) * voxels, "rows");
-  add_positions(job, voxels, stage, writer);
+  ExportStage stage(job, "export", (1 + has_positions + attributes.size()) * voxels, "rows");
+  add_cells(job, voxels, stage, writer);
+  if (has_positions) add_positions(job, voxels, stage, writer);
   std::string arrays =
-      "numpy.load() gives 'cells' (int32), 'positions' (their centers, float64) and 'grid' (low "
-      "corner of the grid and edge of a voxel)";
+      std::string("numpy.load() gives 'cells' (int32), ") +
+      (has_positions ? "'positions' (their centers, float64) and " : "") +
+      "'grid' (low corner of the grid and edge of a voxel)" +
+      (has_positions ? "" : "; the centers are grid[:3] + (cells + 0.5) * grid[3]");
   for (AttributeCursor& attribute : attributes)
     arrays += add_values(job, voxels, attribute, stage, writer);
   writer.add("grid", "<f8", 1, 4, [&](const auto& put) {
-    for (size_t axis = 0; axis < 3; ++axis) put(job.file.origin()[axis]);
+    for (size_t axis = 0; axis < 3; ++axis) put(job.origin(axis));
     put(job.cell_edge());
   });
   report.bytes = writer.finish();

@@ -205,9 +205,8 @@ SelectedDag::SelectedDag(const ExportJob& job)
   if (job.selects_all_of(job.dag.grid_levels()) && !has_wide_levels(job.file)) {
     voxels_ = job.file.voxels();
     for (uint32_t level = 0; level <= brick_level(); ++level) {
-      const voxdag_reader::Level& l = job.file.level(level);
-      words_.emplace_back(l.words, static_cast<size_t>(l.word_count));
-      nodes_.push_back(l.node_count);
+      words_.push_back(job.dag.level(level).words);
+      nodes_.push_back(job.file.level(level).node_count);
     }
     return;
   }

@@ -58,9 +58,9 @@ class BrickOffsets {
 
 void put_svdag_header(const ExportJob& job, const SelectedDag& dag, uint64_t first_leaf,
                       ExportFile& file) {
-  for (size_t axis = 0; axis < 3; ++axis) file.put(static_cast<float>(job.file.origin()[axis]));
+  for (size_t axis = 0; axis < 3; ++axis) file.put(static_cast<float>(job.origin(axis)));
   for (size_t axis = 0; axis < 3; ++axis)
-    file.put(static_cast<float>(job.file.origin()[axis] + job.file.edge()));
+    file.put(static_cast<float>(job.origin(axis) + job.file.edge()));
   file.put(static_cast<float>(job.file.edge()));
   file.put(dag.grid_levels());
   file.put(static_cast<uint32_t>(dag.node_count() + kLeafWords));
@@ -122,6 +122,7 @@ ExportReport write_svdag(const ExportJob& job) {
   put_svdag_bricks(dag, first_leaf, stage, file);
   ExportFile* const written[] = {&file};
   report.bytes = publish(job, written);
+  report.add_fact("words", words);
   if (words > kMaxViewedWords)
     report.notes.push_back("viewers that index words with 31 bits cannot show " +
                            count_text(words) + " words");

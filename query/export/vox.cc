@@ -363,11 +363,15 @@ ExportReport write_vox(const ExportJob& job) {
   writer.write(file, stage, dag, colors);
   ExportFile* const written[] = {&file};
   report.bytes = publish(job, written);
-  report.notes.push_back("z is up: a voxel (x, y, z) is at (x, -z, y); " +
+  report.notes.push_back((job.turn.is_none() ? "z is up: a voxel (x, y, z) is at (x, -z, y); "
+                                             : "a voxel (x, y, z) is at (x, y, z); ") +
                          count_text(writer.instance_count()) + " instances");
-  if (job.has_colors)
+  report.add_fact("instances", writer.instance_count());
+  if (job.has_colors) {
+    report.add_fact("palette_colors", colors.count());
     report.notes.push_back("a palette of " + count_text(colors.count()) +
                            " colors; each place has a separate model (--gray shares equal models)");
+  }
   if (dag.grid_levels() > std::bit_width(kMagicaVoxelEdge) - 1)
     report.notes.emplace_back(
         "MagicaVoxel shows at most 2048 voxels per edge; other readers take all");

@@ -67,7 +67,7 @@ class VoxelWriter {
     const auto corner = [&](double offset) {
       std::string text;
       for (size_t axis = 0; axis < 3; ++axis)
-        text += (axis ? ", " : "") + number_text(job_.file.origin()[axis] + offset);
+        text += (axis ? ", " : "") + number_text(job_.origin(axis) + offset);
       return "[" + text + "]";
     };
     const std::string bounds =

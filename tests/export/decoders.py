@@ -48,9 +48,12 @@ def ply(path, grid):
 
 def npz(path, grid):
     with numpy.load(path) as arrays:  # also checks the CRC of each array
-        assert sorted(arrays.files) == ["cells", "grid", "positions"]
-        assert arrays["cells"].dtype == numpy.int32 and arrays["positions"].dtype == numpy.float64
         assert (arrays["grid"] == [*grid.origin, grid.voxel]).all()
+        assert arrays["cells"].dtype == numpy.int32
+        if sorted(arrays.files) == ["cells", "grid"]:  # --compact
+            return arrays["cells"]
+        assert sorted(arrays.files) == ["cells", "grid", "positions"]
+        assert arrays["positions"].dtype == numpy.float64
         assert (grid.cells(arrays["positions"]) == arrays["cells"]).all()
         return arrays["cells"]
 
@@ -249,11 +252,13 @@ def bt(path, grid, reader):
     listed = subprocess.run([reader, path], capture_output=True, check=True)
     leaves = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 5)
     corners, edges, occupied = leaves[:, :3] - 32768, leaves[:, 3], leaves[:, 4] == 1
+    # OctoMap's origin is the scene's, up to half a voxel.
+    corners = corners - numpy.floor(grid.origin / grid.voxel + 0.5).astype(numpy.int64)
     assert ((edges[occupied] == 1) | (edges[occupied] >= 8)).all()
-    # Known cells are in the region; in a complete grid all cells are known.
+    # Known cells are in the region. Cells at its border can be unknown.
     assert (corners >= grid.low).all() and (corners + edges[:, None] <= grid.high).all()
     known = (edges.astype(numpy.int64) ** 3).sum()
-    assert known == grid.resolution**3 or (grid.high - grid.low < grid.resolution).any()
+    assert known >= numpy.maximum(grid.high - grid.low - 16, 0).prod()
     return cells_of_cubes(corners[occupied], edges[occupied])
 
 
@@ -350,11 +355,16 @@ def vox(path, grid):
 
 
 def vdb(path, grid):
-    read = pyopenvdb.read(path, "voxels")
+    name = pyopenvdb.readAllGridMetadata(path)[0].name
+    read = pyopenvdb.read(path, name)
+    is_density = isinstance(read, pyopenvdb.FloatGrid)
+    assert name == ("density" if is_density else "voxels")
+    assert not is_density or read.gridClass == pyopenvdb.GridClass.FOG_VOLUME
     assert not read.background
     low, high = read.evalActiveVoxelBoundingBox()
-    values = numpy.zeros(numpy.array(high) - low + 1, bool)
+    values = numpy.zeros(numpy.array(high) - low + 1, numpy.float32 if is_density else bool)
     read.copyToArray(values, ijk=low)
+    assert set(numpy.unique(values)) <= {0, 1}
     cells = numpy.argwhere(values) + low
     assert len(cells) == read.activeVoxelCount()
     some = cells[:: max(1, len(cells) // 100)]

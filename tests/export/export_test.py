@@ -47,14 +47,27 @@ CASES = [
     (512, ["--level", "8", "--region", "101,3,50,170,201,133"]),
 ]
 
+# More exports of some formats.
+MORE_CASES = {
+    "vdb": [(64, ["--grid", "mask"]), (256, ["--level", "7", "--grid", "mask"])],
+    "nvdb": [(64, ["--grid", "mask"]), (256, ["--level", "7", "--grid", "mask"])],
+    "npz": [(64, ["--compact"])],
+}
+# Exports with another axis up than the format's default.
+TURN_CASES = [(64, []), (256, ["--level", "7", "--region", "9,0,30,90,101,83"])]
+
 # Options of exports of the solid, whose resolution is 64.
 SOLID_CASES = [[], ["--level", "5"], ["--region", "5,0,16,64,49,60"]]
 
 
 class Grid:
-    """The exported grid. Converts between its cells and world coordinates."""
+    """The exported grid. Converts between its cells and world coordinates.
 
-    def __init__(self, info, levels, region):
+    `turn`: "z" if the y axis of the file is the z axis of the grid, (x, y, z) -> (x, -z, y); "y"
+    for the inverse turn; None for the axes of the file.
+    """
+
+    def __init__(self, info, levels, region, turn=None):
         self.levels = levels
         self.resolution = 2**levels
         self.origin = numpy.array(info["bounds"]["origin"])
@@ -62,6 +75,22 @@ class Grid:
         self.voxel = self.edge / self.resolution
         self.low = numpy.array(region[:3] if region else [0] * 3)
         self.high = numpy.array(region[3:] if region else [self.resolution] * 3)
+        self.turn = turn
+        if turn:
+            x, y, z = self.origin
+            self.origin = (
+                numpy.array([x, -(z + self.edge), y])
+                if turn == "z"
+                else numpy.array([x, z, -(y + self.edge)])
+            )
+            corners = self.turned(numpy.array([self.low, self.high - 1]))
+            self.low, self.high = corners.min(axis=0), corners.max(axis=0) + 1
+
+    def turned(self, cells):
+        x, y, z = cells.T
+        last = self.resolution - 1
+        turns = {None: (x, y, z), "z": (x, last - z, y), "y": (x, z, last - y)}
+        return numpy.stack(turns[self.turn], axis=1)
 
     def cells(self, centers):
         """Returns the cells that have these centers in world space."""
@@ -111,16 +140,17 @@ class Test:
         listed = subprocess.run(
             [self.list_voxels, path, str(shift)], capture_output=True, check=True
         )
-        cells = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 3)
+        cells = grid.turned(numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 3))
         cells = cells[((cells >= grid.low) & (cells < grid.high)).all(axis=1)]
         return numpy.unique(keys(cells))
 
-    def check(self, resolution, options, solid=False):
+    def check(self, resolution, options, solid=False, turn=None):
         path, info = self.solid() if solid else self.scene(resolution)
         given = dict(zip(options[::2], options[1::2]))
         full = resolution.bit_length() - 1
         region = [int(x) for x in given["--region"].split(",")] if "--region" in given else None
-        grid = Grid(info, int(given.get("--level", full)), region)
+        grid = Grid(info, int(given.get("--level", full)), region, turn)
+        options = [*options, "--up", turn] if turn else options
         output = "out" + SUFFIXES.get(self.name, "." + self.name)
         report = json.loads(
             self.run("export", path, "--to", self.name, "-o", output, "--json", "--force", *options)
@@ -218,6 +248,10 @@ def main():
             test.check(resolution, options)
         for options in SOLID_CASES:
             test.check(64, options, solid=True)
+        for resolution, options in MORE_CASES.get(name, []):
+            test.check(resolution, options)
+        for resolution, options in TURN_CASES:
+            test.check(resolution, options, turn="y" if name == "vox" else "z")
         test.check_colors()
         test.check_refusals()
     return 0

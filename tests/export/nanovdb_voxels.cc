@@ -1,7 +1,7 @@
 // nanovdb_voxels FILE.nvdb [GRID]: writes, as doubles, the world coordinates of all voxels that are
-// on in the file's first grid, in leaves or in tiles. With GRID, writes the voxels of the grid of
-// this name, each followed by its three values. The program reads the file with NanoVDB's own
-// reader.
+// on in the file's first grid, in leaves or in tiles: a mask, or floats, which must be 1. With
+// GRID, writes the voxels of the grid of this name, each followed by its three values. The program
+// reads the file with NanoVDB's own reader.
 #include <nanovdb/util/IO.h>
 
 #include <cstdio>
@@ -52,6 +52,9 @@ int main(int argc, char** argv) {
   if (argc != 2 && argc != 3) return 2;
   const auto handle = argc == 3 ? nanovdb::io::readGrid(argv[1], std::string(argv[2]))
                                 : nanovdb::io::readGrid(argv[1]);
+  bool is_one = true;
+  const auto* const density = argc == 3 ? nullptr : handle.grid<float>();
+  if (density && !density->isFogVolume()) return 1;
   const bool done = argc == 3 ? list(handle.grid<nanovdb::Vec3f>(),
                                      [](const nanovdb::Vec3f& value) {
                                        for (int i = 0; i < 3; ++i) {
@@ -59,6 +62,7 @@ int main(int argc, char** argv) {
                                          std::fwrite(&part, sizeof(part), 1, stdout);
                                        }
                                      })
+                    : density ? list(density, [&](float value) { is_one = is_one && value == 1; })
                               : list(handle.grid<nanovdb::ValueMask>(), [](bool) {});
-  return done && std::fflush(stdout) == 0 ? 0 : 1;
+  return done && is_one && std::fflush(stdout) == 0 ? 0 : 1;
 }

@@ -97,6 +97,7 @@ def check(options, selection, name, folder):
             "--memory",
             options.memory,
             "--json",
+            *(["--grid", "mask"] if name in ("vdb", "nvdb") else []),
             *region,
         ]
     )

@@ -94,6 +94,7 @@ ExportReport write_inp(const ExportJob& job) {
   ExportFile* const written[] = {&file};
   report.bytes = publish(job, written);
   report.notes.push_back(hex_mesh_note(mesh));
+  report.add_fact("points", mesh.points);
   report.notes.emplace_back(
       "all nodes and all elements are in the sets VOXELS; materials, loads and boundary conditions "
       "are yours to add");

@@ -159,6 +159,7 @@ ExportReport write_vtu(const ExportJob& job) {
   report.voxels = cells;
   report.bytes = file.finish();
   report.notes.push_back(hex_mesh_note(mesh));
+  report.add_fact("points", mesh.points);
   return report;
 }
 

@@ -1,6 +1,7 @@
 // Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. The file has a grid of
-// active voxels and, if the input has colors, a grid of the colors in linear light. The color grid
-// has the name "Cd", which Houdini and Blender use. The libraries build the grids completely in
+// voxels and, if the input has colors, a grid of the colors in linear light. The grid of voxels is
+// a fog volume with the name "density", which Houdini and Blender render, or a mask. The color grid
+// has the name "Cd", which both programs use. The libraries build the grids completely in
 // memory, so their size is calculated first and compared with the memory budget.
 //
 // Half floats are converted without Imath's lookup table, because a use of the table would require
@@ -16,7 +17,6 @@
 #include <algorithm>
 #include <bit>
 #include <ostream>
-#include <streambuf>
 #include <vector>
 
 #include "core/base/error.h"
@@ -24,6 +24,7 @@
 #include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
+#include "query/export/vdb/file_buffer.h"
 #include "query/lookup/bricks.h"
 
 namespace voxdag::query {
@@ -34,8 +35,11 @@ namespace {
 struct VdbNodeBytes {
   uint64_t leaf, lower, upper;
 };
-constexpr VdbNodeBytes kOpenVdbBytes = {192, 34 << 10, 272 << 10};
-constexpr VdbNodeBytes kNanoVdbBytes = {96, 34 << 10, 272 << 10};
+constexpr VdbNodeBytes kOpenVdbMaskBytes = {192, 34 << 10, 272 << 10};
+constexpr VdbNodeBytes kNanoVdbMaskBytes = {96, 34 << 10, 272 << 10};
+// Sizes for a grid of floats, one for each voxel of a leaf.
+constexpr VdbNodeBytes kOpenVdbFloatBytes = {2304, 34 << 10, 272 << 10};
+constexpr VdbNodeBytes kNanoVdbFloatBytes = {2176, 34 << 10, 272 << 10};
 // Sizes for a grid of colors. A color is three floats. A node stores for each child one color
 // (padded) or a pointer.
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
@@ -43,8 +47,20 @@ constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 constexpr uint64_t kVdbLeafBytes = 128;
 // Bytes of a tile of 4096^3 voxels in the root's table.
 constexpr uint64_t kRootTileBytes = 128;
-constexpr const char* kGridName = "voxels";
 constexpr const char* kColorGridName = "Cd";
+
+constexpr uint64_t kHalfBytes = 2;  // a float in a .vdb file
+
+using NanoGrid = nanovdb::GridHandle<nanovdb::HostBuffer>;
+
+// A kind of grid for the voxels (--grid).
+struct VoxelGrid {
+  const char* name;
+  VdbNodeBytes open_vdb, nano_vdb;
+  uint64_t value_bytes;  // bytes of a voxel's value in a .vdb file, in addition to the masks
+  openvdb::GridBase::Ptr (*make)(const ExportJob& job, uint64_t voxels);
+  NanoGrid (*make_nano)(const ExportJob& job, uint64_t voxels);
+};
 
 VdbNodeBytes operator+(const VdbNodeBytes& a, const VdbNodeBytes& b) {
   return {a.leaf + b.leaf, a.lower + b.lower, a.upper + b.upper};
@@ -65,69 +81,9 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-// A stream buffer that writes to an ExportFile. Streams swallow exceptions, and the libraries' own
-// errors do not contain the reason. So check() rethrows the first exception.
-class FileBuffer : public std::streambuf {
- public:
-  FileBuffer(ExportFile& file, ExportStage& stage) : file_(file), stage_(stage) {}
-  void check() const {
-    if (failure_) std::rethrow_exception(failure_);
-  }
-
- protected:
-  std::streamsize xsputn(const char* bytes, std::streamsize count) override {
-    // Writes in pieces, to check for cancellation and report progress: a single call may pass a
-    // complete grid.
-    constexpr size_t kPieceBytes = 1 << 20;
-    const bool done = attempt([&] {
-      std::string_view rest(bytes, static_cast<size_t>(count));
-      while (!rest.empty()) {
-        const std::string_view piece = rest.substr(0, kPieceBytes);
-        file_.write(piece);
-        stage_.advance(piece.size());
-        if (piece.size() == kPieceBytes) stage_.report();
-        rest.remove_prefix(piece.size());
-      }
-      at_ += count;
-    });
-    return done ? count : 0;
-  }
-  int_type overflow(int_type byte) override {
-    const char c = traits_type::to_char_type(byte);
-    return xsputn(&c, 1) == 1 ? byte : traits_type::eof();
-  }
-  pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode) override {
-    if (from == std::ios_base::cur) offset += at_;
-    if (from == std::ios_base::end) offset += static_cast<off_type>(file_.size());
-    if (offset == at_) return at_;
-    return attempt([&] { file_.seek(static_cast<uint64_t>(at_ = offset)); }) ? pos_type(at_)
-                                                                             : pos_type(-1);
-  }
-  pos_type seekpos(pos_type at, std::ios_base::openmode mode) override {
-    return seekoff(at, std::ios_base::beg, mode);
-  }
-
- private:
-  template <class Work>
-  bool attempt(const Work& work) {
-    if (failure_) return false;
-    try {
-      work();
-      return true;
-    } catch (...) {
-      failure_ = std::current_exception();
-      return false;
-    }
-  }
-
-  ExportFile& file_;
-  ExportStage& stage_;
-  off_type at_ = 0;
-  std::exception_ptr failure_;
-};
-
 struct VdbSize {
   uint64_t voxels = 0, bytes = 0;
+  uint64_t leaf_voxels = 0;  // voxels that are not in tiles
 };
 // True if full cubes are tiles of the grid of voxels. A grid of colors has no tiles, because the
 // voxels of a cube have different colors.
@@ -169,7 +125,9 @@ VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNode
       job, selection,
       [&](const Brick& brick) {
         steps.advance(1);
-        size.voxels += static_cast<uint64_t>(std::popcount(brick.mask));
+        const auto voxels = static_cast<uint64_t>(std::popcount(brick.mask));
+        size.voxels += voxels;
+        size.leaf_voxels += voxels;
         add_nodes(brick.low, kBrickEdge);
         return size.bytes <= limit;
       },
@@ -184,10 +142,10 @@ VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNode
 }
 
 struct ChargedVdb {
-  uint64_t voxels = 0;
+  uint64_t voxels = 0, leaf_voxels = 0;
   MemoryCharge charge;
 };
-ChargedVdb charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
+ChargedVdb charge_vdb(const ExportJob& job, const VoxelGrid& grid, const VdbNodeBytes& node) {
   const uint64_t limit = job.budget.available();
   const VdbSize size =
       vdb_size(job, job.selection, node, limit, ExportStage(job, "count", 0, "bricks"));
@@ -196,13 +154,14 @@ ChargedVdb charge_vdb(const ExportJob& job, const VdbNodeBytes& node) {
     refuse_size(
         job,
         "the grid would take over " + size_text(limit) + " of memory, the limit --memory" +
-            (job.has_colors ? " (without colors, --gray, it takes less)" : ""),
+            (job.has_colors ? " (without colors, --gray, it takes less)" : "") +
+            (grid.name == std::string_view("mask") ? "" : " (--grid mask takes less)"),
         [&](uint32_t level) {
           return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))
                      .bytes <= limit;
         },
         ErrorCode::kOutOfMemory);
-  return {size.voxels, MemoryCharge(job.budget, size.bytes, "the grid")};
+  return {size.voxels, size.leaf_voxels, MemoryCharge(job.budget, size.bytes, "the grid")};
 }
 
 openvdb::Coord vdb_coord(const Position& cell) {
@@ -231,26 +190,68 @@ void set_brick(const Brick& brick, const Value& value, Accessor& accessor, Expor
   stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
 }
 
+// Returns a grid in which the voxels are active and have the value 1 or true.
 template <class GridType>
-typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t voxels) {
-  const auto grid = empty_vdb_grid<GridType>(job, kGridName);
+typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t voxels, const char* name) {
+  const typename GridType::ValueType on(1);
+  const auto grid = empty_vdb_grid<GridType>(job, name);
   ExportStage stage(job, "build grid", voxels, "voxels");
   typename GridType::Accessor accessor = grid->getAccessor();
   for_each_vdb_part(
       job, job.selection,
       [&](const Brick& brick) {
         set_brick(
-            brick, [](const Position&) { return true; }, accessor, stage);
+            brick, [&](const Position&) { return on; }, accessor, stage);
         return true;
       },
       [&](const Position& low, int64_t edge) {
         const int64_t last = edge - 1;
         grid->tree().sparseFill(
-            {vdb_coord(low), vdb_coord({low[0] + last, low[1] + last, low[2] + last})}, true, true);
+            {vdb_coord(low), vdb_coord({low[0] + last, low[1] + last, low[2] + last})}, on, true);
         stage.advance(cells_of_cube(edge));
         return true;
       });
   return grid;
+}
+
+openvdb::FloatGrid::Ptr make_density(const ExportJob& job, uint64_t voxels) {
+  const auto grid = make_voxel_grid<openvdb::FloatGrid>(job, voxels, "density");
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  grid->setSaveFloatAsHalf(true);  // 0 and 1 are exact
+  return grid;
+}
+
+template <class Grid>
+NanoGrid nano_grid(const Grid& grid) {
+  return nanovdb::openToNanoVDB<nanovdb::HostBuffer>(grid);
+}
+
+constexpr const char* kMaskName = "voxels";
+constexpr VoxelGrid kVoxelGrids[] = {
+    {"density", kOpenVdbFloatBytes, kNanoVdbFloatBytes, kHalfBytes,
+     [](const ExportJob& job, uint64_t voxels) -> openvdb::GridBase::Ptr {
+       return make_density(job, voxels);
+     },
+     [](const ExportJob& job, uint64_t voxels) { return nano_grid(*make_density(job, voxels)); }},
+    {"mask", kOpenVdbMaskBytes, kNanoVdbMaskBytes, 0,
+     [](const ExportJob& job, uint64_t voxels) -> openvdb::GridBase::Ptr {
+       return make_voxel_grid<openvdb::BoolGrid>(job, voxels, kMaskName);
+     },
+     [](const ExportJob& job, uint64_t voxels) {
+       return nano_grid(*make_voxel_grid<openvdb::MaskGrid>(job, voxels, kMaskName));
+     }},
+};
+
+// Returns the grid that the job's option names.
+const VoxelGrid& voxel_grid(const ExportJob& job) {
+  const std::string& wanted = job.options.grid;
+  if (wanted.empty()) return kVoxelGrids[0];
+  std::string names;
+  for (const VoxelGrid& grid : kVoxelGrids) {
+    if (wanted == grid.name) return grid;
+    names += std::string(names.empty() ? "" : ", ") + grid.name;
+  }
+  throw Error(ErrorCode::kInvalidInput, "--grid " + wanted + ": expected one of " + names);
 }
 
 openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job, uint64_t voxels) {
@@ -280,7 +281,7 @@ ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min
   ExportFile file(job.files, job.output);
   {
     ExportStage stage(job, "export", min_bytes, "bytes");
-    FileBuffer buffer(file, stage);
+    FileBuffer buffer(file, stage, min_bytes);
     std::ostream stream(&buffer);
     try {
       write(stream);
@@ -289,6 +290,7 @@ ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min
       throw;
     }
     buffer.check();
+    buffer.finish();
   }
   job.cancel.check();
   ExportFile* const written[] = {&file};
@@ -299,41 +301,43 @@ ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min
 }  // namespace
 
 ExportReport write_vdb(const ExportJob& job) {
+  const VoxelGrid& kind = voxel_grid(job);
   const ChargedVdb charged =
-      charge_vdb(job, job.has_colors ? kOpenVdbBytes + kColorBytes : kOpenVdbBytes);
+      charge_vdb(job, kind, job.has_colors ? kind.open_vdb + kColorBytes : kind.open_vdb);
   const uint64_t voxels = charged.voxels;
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
-    const auto grid = make_voxel_grid<openvdb::BoolGrid>(job, voxels);
+    const openvdb::GridBase::Ptr grid = kind.make(job, voxels);
+    const uint64_t leaf_bytes = grid->constBaseTree().leafCount() * kVdbLeafBytes;
+    uint64_t min_bytes = leaf_bytes + charged.leaf_voxels * kind.value_bytes;
     openvdb::GridPtrVec grids = {grid};
     if (job.has_colors) {
       grids.push_back(make_color_grid(job, voxels));
       // Half floats are precise enough to distinguish the linear values of all sRGB bytes.
       grids.back()->setSaveFloatAsHalf(true);
+      min_bytes += leaf_bytes + voxels * 3 * kHalfBytes;
     }
-    const uint64_t min_bytes = std::max<uint64_t>(grid->tree().leafCount() * kVdbLeafBytes, 1);
-    return write_grid_file(job, voxels, min_bytes, [&](std::ostream& stream) {
-      // Does not compress, because some readers may lack the codec. Compression would gain little
-      // for the grid of voxels, whose leaves consist of bits.
-      openvdb::io::Stream out(stream);
-      out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
-      out.write(grids);
-    });
+    return write_grid_file(job, voxels, std::max<uint64_t>(min_bytes, 1),
+                           [&](std::ostream& stream) {
+                             // Does not compress, because some readers may lack the codec.
+                             openvdb::io::Stream out(stream);
+                             out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
+                             out.write(grids);
+                           });
   });
 }
 
 ExportReport write_nvdb(const ExportJob& job) {
-  VdbNodeBytes both = kOpenVdbBytes + kNanoVdbBytes;
+  const VoxelGrid& kind = voxel_grid(job);
+  VdbNodeBytes both = kind.open_vdb + kind.nano_vdb;
   if (job.has_colors) both = both + kColorBytes + kColorBytes;
-  const ChargedVdb charged = charge_vdb(job, both);
+  const ChargedVdb charged = charge_vdb(job, kind, both);
   const uint64_t voxels = charged.voxels;
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
-    std::vector<nanovdb::GridHandle<nanovdb::HostBuffer>> grids;
-    grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(
-        *make_voxel_grid<openvdb::MaskGrid>(job, voxels)));
-    if (job.has_colors)
-      grids.push_back(nanovdb::openToNanoVDB<nanovdb::HostBuffer>(*make_color_grid(job, voxels)));
+    std::vector<NanoGrid> grids;
+    grids.push_back(kind.make_nano(job, voxels));
+    if (job.has_colors) grids.push_back(nano_grid(*make_color_grid(job, voxels)));
     uint64_t bytes = 0;
     for (const auto& grid : grids) bytes += grid.size();
     return write_grid_file(job, voxels, bytes, [&](std::ostream& stream) {

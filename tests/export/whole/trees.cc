@@ -22,12 +22,20 @@ uint32_t set_below(uint32_t mask, uint32_t bit) {
   return static_cast<uint32_t>(std::popcount(mask & ((1u << bit) - 1)));
 }
 
+// OctoMap's origin, key 32768, is the origin of the scene, up to half a voxel.
+Corner low_corner(const Grid& grid) {
+  Corner low;
+  for (size_t axis = 0; axis < 3; ++axis)
+    low[axis] = 32768 + static_cast<int64_t>(std::floor(grid.origin[axis] / grid.voxel + 0.5));
+  return low;
+}
+
 // Reads the 16 levels of OctoMap's octree in depth-first order. An inner node has two bytes, with
 // two bits per child: 0 is unknown, 1 is free, 2 is occupied, and 3 is an inner node.
 struct BtReader {
   const MappedFile& file;
   uint64_t at;
-  int64_t zero;  // OctoMap's key (integer coordinate) of the grid's low corner
+  Corner zero;  // OctoMap's key (integer coordinates) of the grid's low corner
   Digest& digest;
   uint64_t nodes = 1, known = 0;
 
@@ -55,8 +63,8 @@ struct BtReader {
     for (int64_t i = 0; i < edge; ++i)
       for (int64_t j = 0; j < edge; ++j)
         for (int64_t k = 0; k < edge; ++k)
-          digest.add(edge * corner[0] + i - zero, edge * corner[1] + j - zero,
-                     edge * corner[2] + k - zero);
+          digest.add(edge * corner[0] + i - zero[0], edge * corner[1] + j - zero[1],
+                     edge * corner[2] + k - zero[2]);
   }
 };
 
@@ -145,7 +153,7 @@ void digest_bt(const std::string& path, const Grid& grid, Digest& digest) {
     if (line.starts_with("size ")) size = std::stoull(line.substr(5));
     if (line.starts_with("res ")) expect(std::stod(line.substr(4)) == grid.voxel, "that voxel");
   }
-  BtReader reader{file, at, grid.levels == 16 ? 0 : 32768, digest};
+  BtReader reader{file, at, low_corner(grid), digest};
   reader.node({0, 0, 0}, 0);
   expect(reader.at == file.size() && reader.nodes == size, "as many nodes as the header says");
   std::fprintf(stderr, "known: %llu cells\n", static_cast<unsigned long long>(reader.known));

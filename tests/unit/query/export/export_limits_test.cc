@@ -53,8 +53,8 @@ class ExportLimits : public ::testing::Test {
                       uint64_t memory_bytes) {
     NoProgress progress;
     const CancelToken cancel;
-    const ExportRequest request{&export_format(format), selection, folder_.file(output),
-                                memory_bytes};
+    ExportRequest request{&export_format(format), selection, folder_.file(output), memory_bytes};
+    request.options = options_;
     try {
       export_dag(system_files(), file, request, progress, cancel);
     } catch (const Error& error) {
@@ -68,6 +68,7 @@ class ExportLimits : public ::testing::Test {
 
   static constexpr uint64_t kMemory = 64 << 20;
   TemporaryFolder folder_;
+  ExportOptions options_;  // of refused exports
 };
 
 // If the export of a region is refused, the message names a coarser level that fits, and the region
@@ -164,11 +165,18 @@ TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   for (const ExportFormat& format : export_formats()) {
     const std::string name = format.name;
     if (name == "vdb" || name == "nvdb") {
+      options_.grid = "";
+      const std::string density = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
+      EXPECT_NE(density.find("(--grid mask takes less). --level 8 (256 voxels per edge) fits"),
+                std::string::npos)
+          << density;
+      options_.grid = "mask";
       const std::string message = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
       EXPECT_NE(message.find("would take over 20.00 MiB of memory"), std::string::npos) << message;
       EXPECT_NE(message.find("--level 8 (256 voxels per edge) fits"), std::string::npos) << message;
     }
   }
+  options_.grid = "";
   const std::string message =
       refusal(*file, "glb", "a.glb", ErrorCode::kOutOfMemory, uint64_t{20} << 20);
   EXPECT_NE(message.find("a smaller --region or a coarser --level"), std::string::npos) << message;

@@ -81,11 +81,14 @@ TEST_F(ExportSharing, NotesSayWhatToSet) {
             std::vector<std::string>{"compile the viewer with SCENE_DEPTH 10" + set +
                                      ", and name the files data/<SCENE>1k.basic_dag.*"});
   EXPECT_EQ(run("hashdag", 9).notes,
-            std::vector<std::string>{"compile the viewer with SCENE_DEPTH 9" + set});
+            std::vector<std::string>{"the viewer of HashDAG takes grids of 1024 voxels per edge or "
+                                     "more; its loader reads this file"});
   EXPECT_EQ(run("svdag").notes, std::vector<std::string>{});
   const std::vector<std::string> bt = run("bt").notes;
   ASSERT_EQ(bt.size(), 2u);
-  EXPECT_EQ(bt[0], "add 0, 0, 0 to its coordinates to get scene units");
+  EXPECT_EQ(bt[0],
+            "its coordinates are those of the scene, up to half a voxel: add 0, 0, 0 for the exact "
+            "ones");
   EXPECT_TRUE(bt[1].starts_with("its readers need about ")) << bt[1];
   EXPECT_EQ(run("ply").notes, std::vector<std::string>{});
   EXPECT_EQ(run("npz").notes, std::vector<std::string>{

@@ -1,0 +1,36 @@
+// Exports of selections of one file in one format. All exports share the DAG with turned axes.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/base/memory_budget.h"
+#include "query/dag/dag_view.h"
+#include "query/export/export.h"
+#include "query/export/turn/turned_dag.h"
+
+namespace voxdag::query {
+
+class DagExport {
+ public:
+  // Uses the format, the options, `gray`, `replace` and the memory of the request. `file` must
+  // outlive this object. Throws Error{kInvalidInput} for options that the format does not have.
+  DagExport(const voxdag_reader::File& file, const ExportRequest& request);
+
+  // Like export_dag(), for this selection and output.
+  ExportReport write(FileSystem& files, const Selection& selection, const std::string& output,
+                     Progress& progress, const CancelToken& cancel);
+  // True if the selection has a set cell.
+  bool has_voxels(const Selection& selection) const;
+  const DagView& dag() const { return dag_; }  // in the axes of the file
+
+ private:
+  const voxdag_reader::File& file_;
+  const ExportRequest request_;
+  const AxisTurn turn_;
+  MemoryBudget budget_;
+  const DagView dag_;
+  std::optional<TurnedDag> turned_;  // made by the first write(), unless the turn is none
+};
+
+}  // namespace voxdag::query
