@@ -55,7 +55,7 @@ TEST(MemoryPlan, DividesAWorkersShare) {
   EXPECT_EQ(BackendMemory::page_bytes(10 * kMiB), 8 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(kGiB), 128 * kMiB);
   EXPECT_EQ(BackendMemory::page_bytes(512 * kMiB), 64 * kMiB);
-  EXPECT_EQ(BackendMemory::page_bytes(12 * kGiB), 128 * kMiB);
+  EXPECT_EQ(BackendMemory::page_bytes(12 * kGiB), 512 * kMiB);
   EXPECT_EQ(BackendMemory::table_bytes(64 * kMiB), 16 * kMiB);
   EXPECT_EQ(BackendMemory::plane_table_bytes(64 * kMiB, 64 * kMiB), 4 * kMiB);
   EXPECT_EQ(BackendMemory::plane_table_bytes(64 * kMiB, 16 * kMiB), 2 * kMiB);
