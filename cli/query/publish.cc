@@ -12,6 +12,7 @@
 #include "core/format/global/open_global.h"
 #include "query/package/package_reader.h"
 #include "query/package/write_package.h"
+#include "server/site/single_page.h"
 #include "server/site/viewer_site.h"
 #include "server/tiles/manifest.h"
 
@@ -22,7 +23,7 @@ constexpr uint64_t kMinPackBytes = query::kFirstPackBytes, kMaxPackBytes = uint6
 
 struct PublishCommand {
   std::string input, output, check, title, memory, pack_size;
-  bool gray = false, quiet = false, json = false;
+  bool gray = false, single_file = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
@@ -91,6 +92,17 @@ void check(const PublishCommand& command, CommandContext& context) {
                 count_text(color_pages).c_str(), count_text(packs).c_str());
 }
 
+query::PackageReport write(const PublishCommand& command, const voxdag_reader::File& file,
+                           const query::PackageSpec& spec, Progress& progress,
+                           CommandContext& context) {
+  const std::string title = title_of(command);
+  if (command.single_file)
+    return server::write_single_page(file, spec, title, command.force, context.files, progress,
+                                     context.cancel);
+  return query::write_package(file, spec, server::viewer_site(title), context.files, progress,
+                              context.cancel);
+}
+
 void run(const PublishCommand& command, CommandContext& context) {
   if (!command.check.empty()) return check(command, context);
   if (command.input.empty() || command.output.empty())
@@ -105,9 +117,7 @@ void run(const PublishCommand& command, CommandContext& context) {
   spec.manifest = manifest_of(command, *file, context.cancel);
   const auto progress = make_progress_bar(command.quiet);
   const RunTimer timer;
-  const query::PackageReport report =
-      query::write_package(*file, spec, server::viewer_site(title_of(command)), context.files,
-                           *progress, context.cancel);
+  const query::PackageReport report = write(command, *file, spec, *progress, context);
   const RunTimes times = timer.elapsed();
   if (!command.json) return print(command, report, times);
   print_json(report_json(command, report, times));
@@ -118,6 +128,9 @@ void declare(Command& command, PublishCommand& state) {
   command.output_option("-o,--output", state.output, "the folder to write, for a web server");
   command.option("--check", state.check, "check all files of a folder that this command wrote");
   command.option("--title", state.title, "title of the page (default: the name of the file)");
+  const Option single_file = command.flag("--single-file", state.single_file,
+                                          "write one HTML file, which needs no web server");
+  command.flag("--force", state.force, "replace an existing file").needs(single_file);
   command.flag("--gray", state.gray, "leave out the colors");
   command.option("--pack-size", state.pack_size,
                  "size of the files with tiles, such as 8MiB, the default");

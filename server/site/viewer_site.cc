@@ -73,22 +73,32 @@ std::string percent_encoded(const std::string& text) {
   return result;
 }
 
-std::string head_of(const std::string& title, const std::string& script) {
+// `url` is the URL of the package (web/viewer/package/published.js), `script` the element with the
+// viewer.
+std::string head_of(const std::string& title, const std::string& url, const std::string& script) {
   std::string head = "  <title>" + escaped(title) + "</title>\n";
-  head += "  <meta name=\"voxdag-package\" content=\"./\">\n";
+  head += "  <meta name=\"voxdag-package\" content=\"" + url + "\">\n";
   head += "  <link rel=\"icon\" href=\"data:image/svg+xml," + percent_encoded(asset("icon.svg")) +
           "\">\n";
-  head += "  <script type=\"module\" src=\"" + script + "\"></script>\n  <style>\n";
+  head += script + "  <style>\n";
   for (const char* name : {"app.css", "parts.css", "viewer.css"}) head += asset(name);
   return head + "  </style>\n";
 }
 
+std::string viewer_module() { return bundle_modules("viewer/package/main.js", asset); }
+
 }  // namespace
 
 std::vector<query::ViewerFile> viewer_site(const std::string& title) {
-  const std::string module = bundle_modules("viewer/package/main.js", asset);
+  const std::string module = viewer_module();
   const std::string name = query::hashed_name("viewer", module, ".js");
-  return {{name, module}, {"index.html", page_with_head(head_of(title, name))}};
+  const std::string script = "  <script type=\"module\" src=\"" + name + "\"></script>\n";
+  return {{name, module}, {"index.html", page_with_head(head_of(title, "./", script))}};
+}
+
+std::string page_with_module(const std::string& title) {
+  const std::string script = "  <script type=\"module\">\n" + viewer_module() + "</script>\n";
+  return page_with_head(head_of(title, "", script));
 }
 
 }  // namespace voxdag::server

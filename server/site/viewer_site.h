@@ -12,4 +12,8 @@ namespace voxdag::server {
 // finds the package in its folder.
 std::vector<query::ViewerFile> viewer_site(const std::string& title);
 
+// Returns the page with the module in it. It finds the files of the package in the page, in
+// elements <script type="text/plain" data-file=NAME> with their base64.
+std::string page_with_module(const std::string& title);
+
 }  // namespace voxdag::server

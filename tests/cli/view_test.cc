@@ -72,6 +72,11 @@ TEST_F(View, IsPublished) {
   expect_error(2, "m.vdag is a file: expected a new folder", {"publish", "m.vdag", "-o", "m.vdag"});
   expect_error(2, "--pack-size 1KiB: expected 256KiB to 1GiB",
                {"publish", "m.vdag", "-o", "q", "--pack-size", "1KiB"});
+  EXPECT_EQ(run_json({"publish", "m.vdag", "-o", "p.html", "--single-file"})["files"], 1);
+  EXPECT_NE(contents("p.html").find("data-file=\"package.json\">eyJ"), std::string::npos);
+  EXPECT_FALSE(exists("p.html.partial") || exists("p.html.lock"));
+  expect_error(2, "--force", {"publish", "m.vdag", "-o", "p.html", "--single-file"});
+  run_json({"publish", "m.vdag", "-o", "p.html", "--single-file", "--force"});
   expect_error(2, "--check DIR", {"publish", "m.vdag"});
   expect_error(3, "package.json", {"publish", "--check", "q"});
 }

@@ -46,6 +46,10 @@ TEST(ViewerSite, RefersToNoOtherFile) {
   EXPECT_NE(page.find("<title>a &lt;b&gt; &amp; &quot;c&quot;</title>"), page.npos);
   EXPECT_NE(page.find("src=\"" + site[0].name + "\""), page.npos);
   EXPECT_EQ(page.find("=\"/"), page.npos);
+  const std::string single = page_with_module("a");
+  EXPECT_EQ(single.find("=\"/"), single.npos);
+  EXPECT_NE(single.find(site[0].contents), single.npos);
+  EXPECT_EQ(site[0].contents.find("</script"), std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,96 @@
+#include "server/site/single_page.h"
+
+#include <span>
+
+#include "core/base/error.h"
+#include "query/dag/locked_outputs.h"
+#include "query/dag/temporary_work.h"
+#include "query/package/package_reader.h"
+#include "server/site/viewer_site.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
+
+std::string base64_of(std::string_view bytes) {
+  constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t group = 0;
+    for (size_t j = 0; j < 3; ++j)
+      group = group << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0);
+    for (size_t j = 0; j < 4; ++j)
+      text += i + j > bytes.size() ? '=' : kDigits[group >> (18 - 6 * j) & 63];
+  }
+  return text;
+}
+
+// Writes a text file piece by piece.
+class TextWriter {
+ public:
+  TextWriter(FileSystem& files, const std::string& path) : out_(files.create(path)) {}
+  void add(std::string_view text) {
+    out_->write_at(bytes_, std::as_bytes(std::span(text.data(), text.size())));
+    bytes_ += text.size();
+  }
+  uint64_t finish() {
+    out_->sync();
+    out_->close();
+    return bytes_;
+  }
+
+ private:
+  const std::unique_ptr<WritableFile> out_;
+  uint64_t bytes_ = 0;
+};
+
+// Writes the page with the files of a package. Returns the page's size.
+uint64_t write_page(const std::string& package, const std::string& title, const std::string& path,
+                    FileSystem& files, const CancelToken& cancel) {
+  const query::PackageIndex index = query::PackageReader(files, package).index();
+  std::vector<std::string> names = {query::kIndexName, index.directory.name};
+  for (const query::PackageFile& pack : index.packs) names.push_back(pack.name);
+  const std::string page = page_with_module(title), end = "</body>";
+  const size_t data = page.rfind(end);
+  TextWriter out(files, path);
+  out.add(page.substr(0, data));
+  for (const std::string& name : names) {
+    cancel.check();
+    out.add("<script type=\"text/plain\" data-file=\"" + name + "\">");
+    out.add(base64_of(read_small_file(files, package + "/" + name, kMaxFileBytes)));
+    out.add("</script>\n");
+  }
+  out.add(page.substr(data));
+  return out.finish();
+}
+
+}  // namespace
+
+query::PackageReport write_single_page(const voxdag_reader::File& file, query::PackageSpec spec,
+                                       const std::string& title, bool replace, FileSystem& files,
+                                       Progress& progress, const CancelToken& cancel) {
+  const std::string output = spec.output, partial = output + ".partial";
+  query::LockedOutputs outputs(files, {{output}, {file.path()}, replace});
+  const query::TemporaryWork work(files, output + ".work-");
+  spec.output = work.path() + "/package";
+  query::PackageReport report = query::write_package(file, spec, {}, files, progress, cancel);
+  if (report.bytes > kMaxSinglePageBytes)
+    throw Error(ErrorCode::kLimit, output + ": the package has " + std::to_string(report.bytes) +
+                                       " bytes, expected at most " +
+                                       std::to_string(kMaxSinglePageBytes) + " with --single-file");
+  try {
+    report.bytes = write_page(spec.output, title, partial, outputs.files(), cancel);
+    outputs.files().rename(partial, output);
+  } catch (const Error&) {
+    if (files.exists(partial)) files.remove(partial);
+    throw;
+  }
+  files.sync_directory(parent_directory(output));
+  report.files = 1;
+  return report;
+}
+
+}  // namespace voxdag::server
