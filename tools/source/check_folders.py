@@ -177,11 +177,12 @@ BARE = ["core/base", "core/geometry", "core/dag", "core/color", "core/backend"]
 LIBRARY = re.compile(
     r"(zstd|tiny_gltf|sqlite3|httplib|png|zlib|xxhash)\.h$|^(nlohmann|openssl|CLI|gtest|gmock|benchmark)/"
 )
-# The reader that users copy into their engine. Its two headers include only the standard library
+# The reader that users copy into their engine. Its three headers include only the standard library
 # and each other.
 STANDALONE_HEADERS = {
-    "core/format/global/voxdag_reader.h": ["voxdag_reader_colors.h"],
-    "core/format/global/voxdag_reader_colors.h": [],
+    "core/format/global/voxdag_reader.h": ["voxdag_reader_bytes.h", "voxdag_reader_colors.h"],
+    "core/format/global/voxdag_reader_colors.h": ["voxdag_reader_bytes.h"],
+    "core/format/global/voxdag_reader_bytes.h": [],
 }
 # The folders in which headers with a folder in their name are found.
 INCLUDE_ROOTS = ("", "include/")

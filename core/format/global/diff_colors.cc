@@ -10,7 +10,6 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
-#include "core/format/global/cell_places.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
 
@@ -26,7 +25,7 @@ using voxdag_reader::File;
 // The cubes of this level, at most 2^18, are divided among the threads.
 constexpr uint32_t kSharedLevel = 6;
 
-// A cube that is set in both files: its Morton code, and its place (cell_places.h) in each file.
+// A cube that is set in both files: its Morton code, and its place (open_global.h) in each file.
 struct CommonCube {
   uint64_t code = 0;
   std::array<uint64_t, 2> places{};

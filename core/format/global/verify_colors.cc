@@ -9,7 +9,6 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/color/blocks/value_region.h"
-#include "core/format/global/cell_places.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag {
@@ -48,7 +47,7 @@ class CellWalk {
         cells += count(level + 1, child_place_at(file_, level, place, i), target, limit - cells);
     return cells;
   }
-  // Sets `place` to the place (cell_places.h) of the cube with Morton code `code`. Returns false if
+  // Sets `place` to the place (open_global.h) of the cube with Morton code `code`. Returns false if
   // the cube is not set.
   bool find(uint32_t level, uint64_t code, uint64_t& place) const {
     place = 0;

@@ -1,7 +1,9 @@
-// Reads voxdag's global file (.vdag). Depends only on the C++17 standard library, POSIX and
-// voxdag_reader_colors.h. Copy both headers into your engine. docs/format.md describes the file.
+// Reads voxdag's global file (.vdag). Depends only on the C++17 standard library, POSIX or Windows,
+// and the two other voxdag_reader headers. Copy the three headers into your engine. docs/format.md
+// describes the file.
 //
 //     voxdag_reader::File dag("scene.vdag");               // throws voxdag_reader::Error
+//     voxdag_reader::File packed(data, size);              // a file that is already in memory
 //     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
 //     dag.walk(visitor);                                   // depth first, the visitor may prune
 //     if (auto rgb = dag.color(x, y, z, level)) ...        // of a cell of edge R/2^level
@@ -22,15 +24,12 @@
 //
 // The file is mapped, or read into memory if mmap fails or Access::kRead is requested. A mapped
 // file must not be truncated while it is open. A File is immutable; any thread may use it.
+//
+// For programs without exceptions, define VOXDAG_READER_NO_EXCEPTIONS before including this header:
+// errors then call voxdag_reader::error_handler and end the program.
 #pragma once
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -41,6 +40,7 @@
 #include <utility>
 #include <vector>
 
+#include "voxdag_reader_bytes.h"
 #include "voxdag_reader_colors.h"
 
 namespace voxdag_reader {
@@ -104,77 +104,16 @@ inline uint64_t xxh64(const unsigned char* bytes, size_t size) {
   return h ^ h >> 32;
 }
 
-// kMap maps the file; kRead reads all of it into memory.
-enum class Access { kMap, kRead };
-
-// The bytes of a file, mapped or read into memory.
-class Bytes {
- public:
-  Bytes(const std::string& path, Access access) {
-    const int fd = open_file(path);
-    struct stat s;
-    if (fstat(fd, &s) != 0 || !S_ISREG(s.st_mode)) {
-      ::close(fd);
-      throw Error(Problem::kIo, path + " is not a regular file: expected a .vdag file");
-    }
-    size_ = static_cast<uint64_t>(s.st_size);
-    if (access == Access::kMap && size_ > 0) {
-      void* const map = mmap(nullptr, size_, PROT_READ, MAP_SHARED, fd, 0);
-      if (map != MAP_FAILED) map_ = map;
-    }
-    if (!map_) read_all(fd, path);
-    ::close(fd);
-  }
-  Bytes(const Bytes&) = delete;
-  Bytes& operator=(const Bytes&) = delete;
-  ~Bytes() {
-    if (map_) munmap(map_, size_);
-  }
-  // Returns the bytes of the file. They are aligned to 8 bytes.
-  const unsigned char* data() const {
-    return static_cast<const unsigned char*>(map_ ? map_ : copy_.data());
-  }
-  uint64_t size() const { return size_; }
-  // Drops the resident pages of a mapping. They are loaded again when they are used.
-  void release_pages() const {
-    if (map_) madvise(map_, size_, MADV_DONTNEED);
-  }
-
- private:
-  // Opens the file. Without O_NONBLOCK, opening a pipe would wait for its writer. The flag has no
-  // effect on regular files.
-  static int open_file(const std::string& path) {
-    const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd >= 0) return fd;
-    const Problem problem = errno == ENOENT || errno == ENOTDIR ? Problem::kNotFound : Problem::kIo;
-    throw Error(problem, "open " + path + ": " + strerror(errno));
-  }
-  void read_all(int fd, const std::string& path) {
-    copy_.resize(static_cast<size_t>((size_ + 7) / 8));
-    char* const to = reinterpret_cast<char*>(copy_.data());
-    for (uint64_t done = 0; done < size_;) {
-      const ssize_t n = ::read(fd, to + done, static_cast<size_t>(size_ - done));
-      if (n < 0 && errno == EINTR) continue;
-      if (n <= 0) {
-        const std::string why = n < 0 ? strerror(errno) : "the file is shorter now";
-        ::close(fd);
-        throw Error(Problem::kIo, "read " + path + ", byte " + std::to_string(done) + ": " + why);
-      }
-      done += static_cast<uint64_t>(n);
-    }
-  }
-
-  void* map_ = nullptr;
-  std::vector<uint64_t> copy_;
-  uint64_t size_ = 0;
-};
-
 class File {
  public:
   // Throws Error if the file cannot be read, is not a global file, has an unsupported version, or
   // has a damaged header.
   explicit File(const std::string& path, Access access = Access::kMap)
       : File(path, std::make_shared<const Bytes>(path, access)) {}
+  // Opens a file in memory. `data` must remain valid and unchanged. It is copied if it is not
+  // aligned to 8 bytes. `name` is for messages.
+  File(const void* data, uint64_t size, const std::string& name = "memory")
+      : File(name, std::make_shared<const Bytes>(data, size)) {}
   // Opens a file whose bytes are already mapped or in memory, for programs that prepare the mapping
   // before it is read. `path` is for messages.
   File(const std::string& path, std::shared_ptr<const Bytes> bytes)
@@ -336,10 +275,10 @@ class File {
   uint64_t block_count() const { return (bytes_->size() - table_offset_) / 8; }
 
   [[noreturn]] void corrupt(const std::string& what) const {
-    throw Error(Problem::kCorrupt, path_ + ": " + what);
+    fail(Problem::kCorrupt, path_ + ": " + what);
   }
   [[noreturn]] void unsupported(const std::string& what) const {
-    throw Error(Problem::kUnsupportedVersion, path_ + ": " + what);
+    fail(Problem::kUnsupportedVersion, path_ + ": " + what);
   }
   [[noreturn]] void outside(uint32_t l, uint64_t offset) const {
     corrupt("level " + str(l) + ", word " + str(offset) + ": no node begins here");

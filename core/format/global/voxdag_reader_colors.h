@@ -1,5 +1,5 @@
 // The part of voxdag_reader.h that reads colors and the other attributes of cells (alpha, normals,
-// materials). Copy both headers into your engine, and include voxdag_reader.h. docs/format.md
+// materials). Copy the three headers into your engine, and include voxdag_reader.h. docs/format.md
 // describes the bytes in "The color section" and "The sections of alpha, normals and materials".
 //
 // A section has a color, or another value, for all set cells of the levels from 0 to the section's
@@ -16,25 +16,12 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "voxdag_reader_bytes.h"
+
 namespace voxdag_reader {
-
-// The kinds of errors.
-enum class Problem { kNotFound, kIo, kCorrupt, kUnsupportedVersion };
-
-// The only exception that the reader throws, besides std::bad_alloc. Its message names the file.
-class Error : public std::runtime_error {
- public:
-  Error(Problem problem, const std::string& message)
-      : std::runtime_error(message), problem_(problem) {}
-  Problem problem() const { return problem_; }
-
- private:
-  Problem problem_;
-};
 
 // Returns the number at `at`, which need not be aligned.
 template <class T>
