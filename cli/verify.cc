@@ -12,6 +12,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/dag/space/cube_walk.h"
 #include "core/format/global/open_global.h"
 #include "query/verify/color_sample.h"
 #include "query/verify/interior_sample.h"
@@ -28,6 +29,7 @@ struct VerifyCommand {
   SceneOptions scene_options;
   std::string cutouts;
   std::string solid;
+  uint32_t radius = 0;
   bool thin = false;
   uint64_t seed = 1;
   std::string memory;
@@ -60,7 +62,8 @@ query::InteriorReport compare_solid(const VerifyCommand& command, const voxdag_r
                                     TriangleSource& scene, const Grid& grid, Progress& progress,
                                     CommandContext& context) {
   if (command.solid == "enclosed")
-    return query::compare_enclosed(file, scene, grid, command.seed, progress, context.cancel);
+    return query::compare_enclosed(file, scene, grid, command.radius, command.seed, progress,
+                                   context.cancel);
   const SolidRule rule = command.solid == "winding" ? SolidRule::kWinding : SolidRule::kParity;
   return query::compare_interior(file, scene, grid, rule, command.seed, progress, context.cancel);
 }
@@ -137,7 +140,15 @@ nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_re
   return json;
 }
 
+void check_radius(const VerifyCommand& command) {
+  if (command.radius == 0 || (command.solid == "enclosed" && command.radius <= kMaxRadius)) return;
+  throw Error(ErrorCode::kInvalidInput, "--radius " + std::to_string(command.radius) +
+                                            ": expected 0 to " + std::to_string(kMaxRadius) +
+                                            ", with --solid enclosed");
+}
+
 void run(const VerifyCommand& command, CommandContext& context) {
+  check_radius(command);
   const auto file = open_global_file(command.path);
   const auto progress = make_progress_bar(command.quiet);
   MemoryBudget budget(~uint64_t{0});
@@ -163,6 +174,7 @@ void declare(Command& command, VerifyCommand& state) {
       .one_of({"skip", "keep"});
   command.option("--solid", state.solid, "winding, parity or enclosed, as in the build")
       .one_of({"winding", "parity", "enclosed"});
+  command.option("--radius", state.radius, "radius of the solid, as in the build");
   command.flag("--thin", state.thin, "the build set thin voxels (--thin)");
   command.option("--point-radius", state.scene_options.point_radius,
                  "half edge of the cube that replaces each point, as in the build");

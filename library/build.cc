@@ -28,6 +28,7 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.hash_bits = options.hash_bits;
   geometry.solid = options.solid;
   geometry.seed = options.seed;
+  geometry.radius = options.radius;
   geometry.attributes[Attribute::kColor] = options.color;
   geometry.attributes[Attribute::kAlpha] = options.alpha;
   geometry.attributes[Attribute::kNormal] = options.normal;

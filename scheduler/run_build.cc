@@ -133,7 +133,10 @@ void resume_subvolumes(BuildJob& job, SubvolumeBuilder& builder, const std::stri
   for (const StoredSubvolume& subvolume : job.store->leaves())
     if (subvolume.state == SubvolumeState::kBuilt) named.insert(subvolume.artifact.segment);
   job.work.remove_garbage([&](uint32_t segment) {
-    return named.contains(segment) || (job.filled && job.filled->names_segment(segment));
+    bool is_named = named.contains(segment);
+    for (const auto* parts : {&job.filled, &job.blocked, &job.closed})
+      is_named = is_named || (*parts && (*parts)->names_segment(segment));
+    return is_named;
   });
   if (!job.store->merge()) job.work.empty_scratch();
 }
@@ -154,8 +157,16 @@ void open_solid(BuildJob& job, const std::string& scene_digest) {
   const std::string identity = scene_digest + " " + geometry_json(geometry);
   FileSystem& files = job.context.files;
   if (geometry.solid == SolidName::kEnclosed) {
-    job.filled = std::make_unique<FilledParts>(files, job.work.filled_path(), identity);
-    job.filled->load();
+    const auto open = [&](const std::string& path) {
+      auto parts = std::make_unique<FilledParts>(files, path, identity);
+      parts->load();
+      return parts;
+    };
+    job.filled = open(job.work.filled_path());
+    if (geometry.radius > 0) {
+      job.blocked = open(job.work.blocked_path());
+      job.closed = open(job.work.closed_path());
+    }
   }
   const SolidRule rule = solid_rule_of(geometry);
   if (rule == SolidRule::kNone) return;
@@ -245,7 +256,8 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   if (replan_damaged(job) > 0) return true;
   if (std::exchange(has_restarted, true)) return false;
   job.store->forget_merge();
-  if (job.filled) job.filled->forget();
+  for (const auto* parts : {&job.filled, &job.blocked, &job.closed})
+    if (*parts) (*parts)->forget();
   job.context.progress.warn("the merge restarts: " + damage.message());
   return true;
 }
@@ -304,6 +316,7 @@ void write_report(BuildJob& job, double start_s) {
   report.warnings = job.store->warnings();
   if (job.filled) report.solid = enclosed_report(report.merge.voxels, shell_voxels(job));
   if (report.solid) report.solid->seed = job.spec.geometry.seed;
+  if (report.solid && job.spec.geometry.radius > 0) report.solid->radius = job.spec.geometry.radius;
   if (report.solid) report.solid->volume = solid_volume(report.grid, report.merge.voxels);
   report.wall_s = wall_seconds() - start_s;
   report.cpu_s = process_cpu_seconds();

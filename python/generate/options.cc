@@ -14,7 +14,7 @@ namespace {
 // the grid from the voxels and set exactly the given voxels, so the options would have no effect.
 constexpr std::array kOnlyForScenes = {
     "bounds", "voxel_size", "point_radius", "columns",          "color", "skip_invalid", "solid",
-    "thin",   "cutouts",    "allow_empty",  "ignore_extension", "seed"};
+    "thin",   "cutouts",    "allow_empty",  "ignore_extension", "seed",  "radius"};
 
 bool is_only_for_scenes(const voxdag::Field& field) {
   return std::ranges::count(kOnlyForScenes, std::string_view(field.name)) > 0;

@@ -5,11 +5,13 @@
 #include <random>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
 #include "core/geometry/crossing.h"
 #include "core/geometry/overlap.h"
+#include "query/verify/empty_cubes.h"
 
 namespace voxdag::query {
 namespace {
@@ -82,10 +84,11 @@ bool is_closed(SolidRule rule, const SampledVoxel& voxel) {
                                     : " is set, but it is outside the scene's surface"));
 }
 
-// Updates the sums of crossings and is_touched of all sampled voxels with the triangles of the
-// scene. Returns false if a triangle was left out because a coordinate was too large.
-bool add_scene(TriangleSource& scene, const Grid& grid, std::vector<SampledVoxel>& voxels,
-               Progress& progress, const CancelToken& cancel) {
+// Calls add_triangle() for the triangles of the scene. Returns false if a triangle was left out
+// because a coordinate was too large.
+template <class Add>
+bool add_scene(TriangleSource& scene, const Grid& grid, Progress& progress,
+               const CancelToken& cancel, const Add& add_triangle) {
   bool is_complete = true;
   progress.begin_stage("interior", scene.declared_triangles(), "triangles");
   scene.for_each_batch([&](std::span<const WorldTriangle> batch) {
@@ -99,38 +102,103 @@ bool add_scene(TriangleSource& scene, const Grid& grid, std::vector<SampledVoxel
         is_complete = false;
         continue;
       }
-      for (SampledVoxel& voxel : voxels) add(triangle, voxel);
+      add_triangle(triangle);
     }
   });
   progress.end_stage();
   return is_complete;
 }
 
-// True if the voxel and its neighbors are set, and all of them are in the grid.
-bool is_surrounded(const voxdag_reader::File& file, const int64_t (&at)[3], int64_t edge) {
-  for (int a = 0; a < 3; ++a)
+// True if the voxel's neighbors are set, and all of them are in the grid.
+bool is_surrounded(const voxdag_reader::File& file, const VoxelPlace& at, int64_t edge) {
+  for (size_t a = 0; a < 3; ++a)
     for (const int64_t step : {-1, 1}) {
-      int64_t p[3] = {at[0], at[1], at[2]};
+      VoxelPlace p = at;
       p[a] += step;
       if (p[a] < 0 || p[a] >= edge || !file.voxel(p[0], p[1], p[2])) return false;
     }
   return true;
 }
 
+VoxelPlace place_of(const SampledVoxel& voxel) {
+  return {voxel.low[0] / kUnitsPerVoxel, voxel.low[1] / kUnitsPerVoxel,
+          voxel.low[2] / kUnitsPerVoxel};
+}
+
+// A step of empty cubes toward a sampled voxel. A triangle must touch one of the voxels in `stops`
+// unless it touches the sampled voxel.
+struct SampledStep {
+  size_t sample;  // index of the sampled voxel
+  std::vector<VoxelPlace> stops;
+  VoxelPlace low, high;  // the bounds of `stops`, in lattice units
+  bool is_stopped = false;
+};
+
+SampledStep step_of(size_t sample, std::vector<VoxelPlace> stops) {
+  SampledStep step{sample, std::move(stops), {}, {}};
+  step.low.fill(INT64_MAX);
+  step.high.fill(INT64_MIN);
+  for (VoxelPlace& stop : step.stops)
+    for (size_t a = 0; a < 3; ++a) {
+      stop[a] *= kUnitsPerVoxel;
+      step.low[a] = std::min(step.low[a], stop[a]);
+      step.high[a] = std::max(step.high[a], stop[a] + kUnitsPerVoxel);
+    }
+  return step;
+}
+
+void add(const FixedTriangle& t, SampledStep& step) {
+  if (step.is_stopped) return;
+  for (int a = 0; a < 3; ++a)
+    if (t.high(a) < step.low[static_cast<size_t>(a)] ||
+        t.low(a) > step.high[static_cast<size_t>(a)])
+      return;
+  for (const VoxelPlace& stop : step.stops) {
+    const int64_t low[3] = {stop[0], stop[1], stop[2]};
+    if (triangle_touches_cube(t, low, kUnitsPerVoxel)) step.is_stopped = true;
+  }
+}
+
+// Returns the steps of empty cubes toward the sampled voxels that are set. Throws Error{kCorrupt}
+// for an empty voxel that is in no empty cube.
+std::vector<SampledStep> sample_steps(const voxdag_reader::File& file, const Grid& grid,
+                                      const std::vector<SampledVoxel>& voxels, uint32_t radius) {
+  std::vector<SampledStep> steps;
+  for (size_t i = 0; i < voxels.size(); ++i) {
+    const VoxelPlace at = place_of(voxels[i]);
+    const bool is_set = file.voxel(at[0], at[1], at[2]);
+    if (is_set && is_surrounded(file, at, grid.resolution())) continue;
+    const EmptyCubes cubes(file, grid.resolution(), at, static_cast<int>(radius));
+    if (!is_set) {
+      if (!cubes.has_center()) refuse(file.path(), voxels[i], true);
+      continue;
+    }
+    for (int axis = 0; axis < 3; ++axis)
+      for (const int side : {-1, 1})
+        if (auto step = cubes.step_from(axis, side); step.has_cubes)
+          steps.push_back(step_of(i, std::move(step.stops)));
+  }
+  return steps;
+}
+
 }  // namespace
 
 InteriorReport compare_enclosed(const voxdag_reader::File& file, TriangleSource& scene,
-                                const Grid& grid, uint64_t seed, Progress& progress,
-                                const CancelToken& cancel) {
+                                const Grid& grid, uint32_t radius, uint64_t seed,
+                                Progress& progress, const CancelToken& cancel) {
   std::vector<SampledVoxel> voxels = draw_voxels(grid, seed);
-  add_scene(scene, grid, voxels, progress, cancel);
+  std::vector<SampledStep> steps = sample_steps(file, grid, voxels, radius);
+  add_scene(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
+    for (SampledVoxel& voxel : voxels) add(triangle, voxel);
+    for (SampledStep& step : steps) add(triangle, step);
+  });
+  for (const SampledStep& step : steps)
+    if (!step.is_stopped) refuse(file.path(), voxels[step.sample], false);
   InteriorReport report;
   for (const SampledVoxel& voxel : voxels) {
-    const int64_t at[3] = {voxel.low[0] / kUnitsPerVoxel, voxel.low[1] / kUnitsPerVoxel,
-                           voxel.low[2] / kUnitsPerVoxel};
+    const VoxelPlace at = place_of(voxel);
     const bool is_set = file.voxel(at[0], at[1], at[2]);
-    if (voxel.is_touched ? !is_set : is_set && !is_surrounded(file, at, grid.resolution()))
-      refuse(file.path(), voxel, voxel.is_touched);
+    if (voxel.is_touched && !is_set) refuse(file.path(), voxel, true);
     ++report.voxels;
     report.inside += !voxel.is_touched && is_set ? 1 : 0;
   }
@@ -142,7 +210,9 @@ InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource&
                                 const CancelToken& cancel) {
   std::vector<SampledVoxel> voxels = draw_voxels(grid, seed);
   InteriorReport report;
-  report.is_closed = add_scene(scene, grid, voxels, progress, cancel);
+  report.is_closed = add_scene(scene, grid, progress, cancel, [&](const FixedTriangle& triangle) {
+    for (SampledVoxel& voxel : voxels) add(triangle, voxel);
+  });
   for (const SampledVoxel& voxel : voxels) report.is_closed &= is_closed(rule, voxel);
   for (const SampledVoxel& voxel : voxels) {
     if (!voxel.is_touched && !report.is_closed) continue;

@@ -7,8 +7,13 @@
 // no triangle touches. If the signs on a row do not add up to 0, the surface is not closed. A build
 // then decides voxels by majorities of rows, so only voxels that triangles touch are compared.
 //
-// The voxels of an enclosed solid are compared with their neighbors in the file instead. A set
-// voxel that no triangle touches has no empty neighbor and is not at the border of the grid.
+// The voxels of an enclosed solid are compared with their neighbors in the file instead:
+//
+//   - An empty voxel is in an empty cube of radius + 1 voxels per edge.
+//   - If a set voxel that no triangle touches has an empty neighbor, a triangle touches a voxel
+//   that
+//     stops an empty cube on its way from the neighbor to the voxel. So without a radius, a set
+//     voxel that no triangle touches has no empty neighbor. Voxels outside the grid are empty.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +43,7 @@ InteriorReport compare_interior(const voxdag_reader::File& file, TriangleSource&
 
 // Like compare_interior(), for an enclosed solid. The report's is_closed is always true.
 InteriorReport compare_enclosed(const voxdag_reader::File& file, TriangleSource& scene,
-                                const Grid& grid, uint64_t seed, Progress& progress,
-                                const CancelToken& cancel);
+                                const Grid& grid, uint32_t radius, uint64_t seed,
+                                Progress& progress, const CancelToken& cancel);
 
 }  // namespace voxdag::query

@@ -58,6 +58,13 @@ void FilledParts::complete(std::vector<FilledPart> parts,
   is_saved_ = false;
 }
 
+std::vector<FilledPart> FilledParts::parts() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<FilledPart> out;
+  for (const auto& [cube, part] : parts_) out.push_back(part);
+  return out;
+}
+
 std::vector<ArtifactRef> FilledParts::artifacts() const {
   const std::lock_guard lock(mutex_);
   std::vector<ArtifactRef> artifacts;

@@ -50,6 +50,8 @@ class FilledParts {
   void complete(std::vector<FilledPart> parts,
                 std::vector<std::unique_ptr<SegmentWriter>> segments);
   bool is_complete() const { return is_complete_; }
+  // Returns all parts.
+  std::vector<FilledPart> parts() const;
   // Returns the artifacts of a complete record.
   std::vector<ArtifactRef> artifacts() const;
   // Makes a complete record durable. Does nothing if it is, or if the record is not complete.

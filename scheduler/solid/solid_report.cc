@@ -61,7 +61,8 @@ std::optional<Warning> solid_warning(const SolidReport& report, const std::strin
     if (report.interior != 0) return std::nullopt;
     return Warning{
         "solid-reached", scene,
-        "nothing is enclosed: walks from the border of the grid reach every empty voxel"};
+        "nothing is enclosed: walks from the border of the grid reach every empty voxel; --radius "
+        "V seals gaps of up to V voxels"};
   }
   if (report.rows == 0) return std::nullopt;
   const bool is_parity = report.rule == name_of(SolidName::kParity);

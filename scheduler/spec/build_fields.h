@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/process_limits.h"
+#include "core/dag/space/cube_walk.h"
 #include "core/fields/field.h"
 #include "scheduler/spec/build_spec.h"
 
@@ -56,6 +57,10 @@ void fields(Visitor& visit, GeometryOptions& g) {
   visit(option("seed", "with solid enclosed: fill only the enclosed space around this point")
             .with(&Field::parts, "X,Y,Z"),
         g.seed);
+  visit(option("radius", "with solid enclosed: seal gaps of up to this many voxels")
+            .range(0, kMaxRadius)
+            .excludes("seed"),
+        g.radius);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
   visit(option("thin", "set fewer voxels: the thinnest surface without holes between faces"),
         g.thin);

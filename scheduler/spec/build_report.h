@@ -20,6 +20,7 @@ namespace voxdag {
 struct SolidReport {
   std::string rule;
   std::optional<std::array<double, 3>> seed;  // the option of the same name
+  std::optional<uint32_t> radius;             // the option of the same name, unless it is 0
   uint64_t interior = 0;                      // set voxels that the surface does not touch
   double volume = 0;                          // volume of all set voxels, in units of the scene
   uint64_t rows = 0;                          // sample rows that cross the surface

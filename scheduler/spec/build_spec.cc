@@ -9,6 +9,9 @@
 namespace voxdag {
 namespace {
 
+// The positions of the walks have a grid of twice the resolution.
+constexpr uint64_t kMaxRadiusResolution = uint64_t{1} << (kMaxGridLevels - 1);
+
 // Calls `action(field, value)` for every field. `value` is the option as JSON; null if the option
 // is not set.
 template <class Action>
@@ -44,6 +47,18 @@ class LimitChecker {
   std::set<std::string> given_;
 };
 
+void check_radius(const GeometryOptions& g) {
+  if (g.radius == 0) return;
+  if (g.solid != SolidName::kEnclosed)
+    json_fields::refuse("radius", "the solid rule enclosed as well");
+  if (g.radius >= g.resolution)
+    json_fields::refuse("radius", "less than the resolution, " + std::to_string(g.resolution) +
+                                      ", not " + std::to_string(g.radius));
+  if (g.resolution > kMaxRadiusResolution)
+    json_fields::refuse("radius",
+                        "a resolution of at most " + std::to_string(kMaxRadiusResolution));
+}
+
 }  // namespace
 
 std::string geometry_json(const GeometryOptions& options) {
@@ -77,6 +92,7 @@ void check_options(const BuildSpec& spec) {
         "solid", "cutouts other than skip, because skipped cutouts are holes in the surface");
   if (g.seed && g.solid != SolidName::kEnclosed)
     json_fields::refuse("seed", "the solid rule enclosed as well");
+  check_radius(g);
   if (g.solid != SolidName::kNone && g.thin)
     json_fields::refuse("thin", "no solid at the same time");
   if (g.thin && g.attributes.any())

@@ -35,6 +35,12 @@
 //                   tables of a part being filled   the share                    SubDagTables
 //                   quadtree of a face              1/16 of the share            nobody
 //                 components at all faces           the rest                     ComponentSets
+//   enclose with a radius, before and after
+//                 cubes of the artifacts            any                          ArtifactTree
+//                 WorkerMemory, for every worker    7/8 of the rest / workers
+//                   segment writer                  1.5 MiB                      SegmentWriter
+//                   nodes around a part, tables     the share                    add_blocked(),
+//                     of its results                                             add_enclosed()
 //   color         surfaces; the rest is spilled     up to 1/3 of free            RecordStore
 //                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet

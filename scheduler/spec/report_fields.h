@@ -33,6 +33,7 @@ template <class Visitor>
 void fields(Visitor& visit, SolidReport& solid) {
   visit("rule", solid.rule);
   visit("seed", solid.seed);
+  visit("radius", solid.radius);
   visit("interior", solid.interior);
   visit("volume", solid.volume);
   visit("rows", solid.rows);

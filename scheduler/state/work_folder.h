@@ -45,6 +45,9 @@ class WorkFolder {
   std::string row_sums_path() const { return path_ + "/rows.vdspill"; }
   // The parts of an enclosed solid that are filled.
   std::string filled_path() const { return path_ + "/filled.vddurable"; }
+  // The blocked and the closed positions of an enclosed solid with a radius.
+  std::string blocked_path() const { return path_ + "/blocked.vddurable"; }
+  std::string closed_path() const { return path_ + "/closed.vddurable"; }
   // The components at the faces of an enclosed solid's parts.
   std::string faces_path() const { return path_ + "/faces.vdspill"; }
   // Colors of cubes that outlive a run.
@@ -76,8 +79,10 @@ class WorkFolder {
   void remove_durable() { remove_silently(durable_path()); }
   // Removes the sample rows of a solid. Errors are ignored.
   void remove_rows() { remove_silently(rows_path()); }
-  // Removes the record of filled parts. Errors are ignored.
-  void remove_filled() { remove_silently(filled_path()); }
+  // Removes the records of the stage `enclose`. Errors are ignored.
+  void remove_filled() {
+    for (const auto& path : {filled_path(), blocked_path(), closed_path()}) remove_silently(path);
+  }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
   // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,

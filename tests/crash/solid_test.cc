@@ -44,6 +44,22 @@ TEST_P(EnclosedCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(EnclosedCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
+// The passes over the positions of a walking cube are interrupted as well.
+class RadiusCrashTest : public EnclosedCrashTest {
+ protected:
+  BuildSpec spec() const override {
+    BuildSpec spec = EnclosedCrashTest::spec();
+    spec.geometry.radius = 2;
+    spec.geometry.resolution = 128;
+    spec.run.subvolume_edge = 64;
+    return spec;
+  }
+};
+
+TEST_P(RadiusCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
+
+INSTANTIATE_TEST_SUITE_P(Ingested, RadiusCrashTest, testing::Values(Ingested::kDurable), name_of);
+
 INSTANTIATE_TEST_SUITE_P(Ingested, EnclosedCrashTest, testing::Values(Ingested::kDurable), name_of);
 
 INSTANTIATE_TEST_SUITE_P(Ingested, SolidCrashTest,

@@ -1,7 +1,6 @@
 #include "scheduler/stages/enclose/enclose_stage.h"
 
 #include <algorithm>
-#include <atomic>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -10,17 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/clock.h"
-#include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/dag/space/enclosed_fill.h"
 #include "core/dag/space/face_code.h"
-#include "core/format/artifact/artifact_writer.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/solid/full_cubes.h"
 #include "scheduler/solid/seed.h"
-#include "scheduler/solid/solid_report.h"
 #include "scheduler/spec/memory_plan.h"
+#include "scheduler/stages/enclose/cube_walks.h"
+#include "scheduler/stages/enclose/enclose_worker.h"
 #include "scheduler/stages/enclose/join_parts.h"
 #include "scheduler/stages/enclose/read_levels.h"
 
@@ -48,30 +45,25 @@ struct LabeledSpace {
   std::optional<SpaceLabels> labels;
 };
 
-// Memory and files of a worker.
-struct EncloseWorker {
-  EncloseWorker(MemoryBudget& budget, uint64_t share_bytes) : share(share_bytes, &budget) {}
-
-  MemoryBudget share;
-  PagePool pool;
-  std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
-  std::unique_ptr<SegmentWriter> filled;
-  std::vector<FilledPart> done;  // parts in `filled` that are not durable
-  double saved_s = wall_seconds();
-};
-
 class Enclosure {
  public:
-  Enclosure(BuildJob& job, const std::set<Cube>& too_large)
-      : job_(job), too_large_(too_large), seed_(seed_of(job.spec.geometry, job.report.grid)) {}
+  // Encloses the space around `walls`, whose cubes are in a grid of this shape. The filled parts
+  // become `result`.
+  Enclosure(BuildJob& job, const std::set<Cube>& too_large, const std::vector<FilledPart>& walls,
+            const DagShape& shape, FilledParts& result)
+      : job_(job),
+        too_large_(too_large),
+        walls_(walls),
+        shape_(shape),
+        result_(result),
+        seed_(seed_of(job.spec.geometry, job.report.grid)) {}
 
   void run() {
-    const std::vector<StoredSubvolume> leaves = shell();
-    job_.context.progress.begin_stage("enclose", 2 * leaves.size(), "subvolumes");
+    job_.context.progress.begin_stage("enclose", 2 * walls_.size(), "subvolumes");
     begin_workers();
-    label(leaves);
-    const OutsideSpace outside = find_outside(parts_, *faces_, seed_, job_.shape().grid_levels,
-                                              job_.budget, job_.context.cancel);
+    label();
+    const OutsideSpace outside =
+        find_outside(parts_, *faces_, seed_, shape_.grid_levels, job_.budget, job_.context.cancel);
     remove_faces();
     fill(outside);
     finish(outside);
@@ -79,32 +71,21 @@ class Enclosure {
   }
 
  private:
-  std::vector<StoredSubvolume> shell() const {
-    std::vector<StoredSubvolume> leaves = job_.store->leaves();
-    std::erase_if(leaves, [](const StoredSubvolume& s) { return s.summary.empty(); });
-    return leaves;
-  }
-
   void begin_workers() {
     const uint64_t free_bytes = job_.budget.available();
     kept_budget_.emplace(MemoryPlan::kept_label_bytes(free_bytes), &job_.budget);
     // Leaves 1/8 of the remaining memory for the components at the faces (find_outside()).
     const auto memory =
         WorkerMemory::divide((free_bytes - kept_budget_->limit()) / 8 * 7, job_.spec.run.threads);
-    const uint32_t first_segment = job_.work.next_segment_id();
-    for (unsigned i = 0; i < memory.workers; ++i) {
-      workers_.push_back(std::make_unique<EncloseWorker>(job_.budget, memory.share_bytes));
-      workers_.back()->filled = std::make_unique<SegmentWriter>(
-          job_.context.files, job_.work.path(), first_segment + i, job_.budget);
-    }
+    workers_ = make_enclose_workers(job_, memory);
     job_.context.files.create(job_.work.faces_path());
     faces_ = std::make_unique<RowFile>(job_.context.files, job_.work.faces_path(), 0);
   }
 
-  void label(const std::vector<StoredSubvolume>& leaves) {
-    parallel_for(static_cast<unsigned>(workers_.size()), leaves.size(),
+  void label() {
+    parallel_for(static_cast<unsigned>(workers_.size()), walls_.size(),
                  [&](unsigned worker, size_t i) {
-                   label_part(*workers_[worker], leaves[i].cube, leaves[i].artifact);
+                   label_part(*workers_[worker], walls_[i].cube, walls_[i].artifact);
                    job_.context.progress.advance(1);
                  });
     std::ranges::sort(parts_, {}, &LabeledPart::cube);
@@ -114,8 +95,8 @@ class Enclosure {
   // the cube does not fit in memory, or if the artifact has separate roots inside the cube.
   void label_part(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell) {
     job_.context.cancel.check();
-    const bool is_smallest = cube.edge_voxels(job_.shape().grid_levels) <= kSmallestEdge;
-    const ArtifactReader artifact = open(worker, shell);
+    const bool is_smallest = cube.edge_voxels(shape_.grid_levels) <= kSmallestEdge;
+    const ArtifactReader artifact = worker.open(job_.work, shell);
     const auto has_root = [&](const auto& is_related) {
       return std::ranges::any_of(artifact.roots(), is_related);
     };
@@ -128,7 +109,7 @@ class Enclosure {
     if (!has_parts && !too_large_.contains(cube)) try {
         return try_label(worker, cube, shell, is_smallest ? 2 : 3);
       } catch (const OutOfBudget&) {
-        if (is_smallest) refuse_memory(worker);
+        if (is_smallest) worker.refuse_memory();
       }
     for (int octant = 0; octant < 8; ++octant) label_part(worker, cube.child(octant), shell);
   }
@@ -186,7 +167,7 @@ class Enclosure {
   // Returns the component with the seed if this component reaches a face of the cube. Throws
   // Error{kInvalidInput} if the seed's voxel is set.
   std::optional<uint32_t> seed_component(const SpaceLabels& labels, const Cube& cube) const {
-    const auto voxel = seed_in(seed_, cube, job_.shape().grid_levels);
+    const auto voxel = seed_in(seed_, cube, shape_.grid_levels);
     if (!voxel) return std::nullopt;
     const SeedPlace place = find_seed(labels, *voxel);
     if (place.kind == SeedPlace::Kind::kSet) refuse_seed_in_shell(*seed_);
@@ -194,22 +175,9 @@ class Enclosure {
     return place.component;
   }
 
-  ArtifactReader open(EncloseWorker& worker, const ArtifactRef& shell) const {
-    auto& segment = worker.segments[shell.segment];
-    if (!segment) segment = job_.work.open_segment(shell.segment);
-    return {segment, shell};
-  }
   std::optional<NodeLevels> read(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell,
                                  PooledMemory& memory) const {
-    return read_levels(open(worker, shell), cube, memory, job_.context.cancel);
-  }
-
-  [[noreturn]] static void refuse_memory(const EncloseWorker& worker) {
-    throw Error(ErrorCode::kOutOfMemory, "the empty space of a subvolume of " +
-                                             std::to_string(kSmallestEdge) +
-                                             " voxels per edge does not fit a worker's share of " +
-                                             std::to_string(worker.share.limit()) +
-                                             " bytes: expected more memory (--memory)");
+    return read_levels(worker.open(job_.work, shell), cube, memory, job_.context.cancel);
   }
 
   void remove_faces() {
@@ -222,7 +190,7 @@ class Enclosure {
     parallel_for(static_cast<unsigned>(workers_.size()), parts_.size(),
                  [&](unsigned worker, size_t i) {
                    job_.context.cancel.check();
-                   if (!job_.filled->find(parts_[i].cube))
+                   if (!result_.find(parts_[i].cube))
                      fill_part(*workers_[worker], parts_[i], outside.of_parts[i]);
                    job_.context.progress.advance(1);
                  });
@@ -238,36 +206,18 @@ class Enclosure {
       if (!space) return;
       SpaceLabels& labels = *space->labels;
       PooledMemory memory{worker.share, worker.pool};
-      const DagShape shape = job_.shape();
-      SubDagTables tables(memory, static_cast<int>(shape.grid_levels - part.cube.level));
+      SubDagTables tables(memory, static_cast<int>(shape_.grid_levels - part.cube.level));
       if (seed_)
-        fill_from_seed(memory, labels, is_outside, seed_in(seed_, part.cube, shape.grid_levels),
+        fill_from_seed(memory, labels, is_outside, seed_in(seed_, part.cube, shape_.grid_levels),
                        tables);
       else
         fill_enclosed(memory, labels, is_outside, tables);
-      worker.done.push_back(write_part(worker, part.cube, tables));
+      worker.add(part.cube, shape_, tables);
     } catch (const OutOfBudget&) {
-      if (part.cube.edge_voxels(job_.shape().grid_levels) <= kSmallestEdge) refuse_memory(worker);
+      if (part.cube.edge_voxels(shape_.grid_levels) <= kSmallestEdge) worker.refuse_memory();
       throw PartTooLarge{part.cube};
     }
-    if (wall_seconds() - worker.saved_s >= job_.spec.run.checkpoint_interval_s) save(worker);
-  }
-
-  FilledPart write_part(EncloseWorker& worker, const Cube& cube, SubDagTables& tables) {
-    const DagShape shape = job_.shape();
-    ArtifactWriter writer(*worker.filled, shape);
-    const SubDagSummary summary =
-        emit_levels(tables, {cube.level, shape.grid_levels, shape.hash_bits}, writer);
-    const ArtifactRoot root{cube, 0, summary.root_hash, summary.voxels, summary.svo_nodes};
-    return {cube, writer.finish({&root, 1}), summary.voxels};
-  }
-
-  // Makes the filled parts of a worker durable.
-  void save(EncloseWorker& worker) {
-    worker.filled->sync();
-    job_.filled->add_durable(std::exchange(worker.done, {}));
-    worker.saved_s = wall_seconds();
-    is_long_ = true;
+    if (worker.is_due(job_)) worker.save(result_);
   }
 
   // Collects all filled parts, adds the empty cubes outside the parts that are enclosed (as full
@@ -275,45 +225,28 @@ class Enclosure {
   void finish(const OutsideSpace& outside) {
     std::vector<FilledPart> all;
     for (const LabeledPart& part : parts_)
-      if (const auto filled = job_.filled->find(part.cube)) all.push_back(*filled);
-    for (const auto& worker : workers_)
-      all.insert(all.end(), worker->done.begin(), worker->done.end());
+      if (const auto filled = result_.find(part.cube)) all.push_back(*filled);
     if (!outside.enclosed_cubes.empty()) {
       const ArtifactRef artifact =
-          add_full_cubes(*workers_[0]->filled, job_.shape(), outside.enclosed_cubes);
+          add_full_cubes(*workers_[0]->filled, shape_, outside.enclosed_cubes);
       for (const Cube& cube : outside.enclosed_cubes) all.push_back(full_part(cube, artifact));
     }
-    std::vector<std::unique_ptr<SegmentWriter>> segments;
-    for (const auto& worker : workers_) {
-      worker->filled->complete();
-      segments.push_back(std::move(worker->filled));
-    }
-    warn_of_walks(outside, all);
-    job_.filled->complete(std::move(all), std::move(segments));
-    if (is_long_) job_.filled->save();
+    for (const auto& worker : workers_)
+      all.insert(all.end(), worker->done.begin(), worker->done.end());
+    if (&result_ == job_.filled.get()) warn_of_walks(job_, all, outside.is_seed_outside);
+    complete_pass(result_, std::move(all), workers_);
   }
 
   FilledPart full_part(const Cube& cube, const ArtifactRef& artifact) const {
-    const int size = static_cast<int>(job_.shape().grid_levels - cube.level);
+    const int size = static_cast<int>(shape_.grid_levels - cube.level);
     return {cube, artifact, full_counts(size).voxels};
-  }
-
-  // Warns if nothing is enclosed, or if a walk leads from the seed to the border.
-  void warn_of_walks(const OutsideSpace& outside, const std::vector<FilledPart>& all) const {
-    const std::string& scene = job_.spec.geometry.scenes.front();
-    if (outside.is_seed_outside) job_.context.progress.warn_of_input(seed_warning(*seed_, scene));
-    if (seed_) return;
-    uint64_t voxels = 0, shell_voxels = 0;
-    for (const FilledPart& part : all) voxels += part.voxels;
-    for (const StoredSubvolume& leaf : job_.store->leaves()) shell_voxels += leaf.summary.voxels;
-    if (shell_voxels == 0) return;
-    const SolidReport report = enclosed_report(voxels, shell_voxels);
-    if (const auto warning = solid_warning(report, scene))
-      job_.context.progress.warn_of_input(*warning);
   }
 
   BuildJob& job_;
   const std::set<Cube>& too_large_;
+  const std::vector<FilledPart>& walls_;
+  const DagShape shape_;
+  FilledParts& result_;
   const std::optional<Seed> seed_;
   std::vector<std::unique_ptr<EncloseWorker>> workers_;
   std::unique_ptr<RowFile> faces_;
@@ -321,19 +254,44 @@ class Enclosure {
   std::vector<LabeledPart> parts_;
   std::optional<MemoryBudget> kept_budget_;
   std::map<Cube, std::unique_ptr<LabeledSpace>> kept_;  // labels that are not computed again
-  std::atomic<bool> is_long_ = false;  // some parts were saved, so finish() saves the record
 };
+
+// Encloses the space around `walls`. Divides parts that exceed the memory.
+void enclose_space(BuildJob& job, const std::vector<FilledPart>& walls, const DagShape& shape,
+                   FilledParts& result) {
+  std::set<Cube> too_large;
+  while (!result.is_complete()) try {
+      Enclosure(job, too_large, walls, shape, result).run();
+    } catch (const PartTooLarge& part) {
+      too_large.insert(part.cube);
+    }
+}
+
+std::vector<FilledPart> shell_parts(const BuildJob& job) {
+  std::vector<FilledPart> parts;
+  for (const StoredSubvolume& leaf : job.store->leaves())
+    if (!leaf.summary.empty()) parts.push_back({leaf.cube, leaf.artifact, leaf.summary.voxels});
+  return parts;
+}
+
+// Encloses the space that walks of a cube do not reach.
+void enclose_by_cube(BuildJob& job) {
+  FilledParts &blocked = *job.blocked, &closed = *job.closed;
+  if (!closed.is_complete()) {
+    if (!blocked.is_complete()) find_blocked(job, shell_parts(job), blocked);
+    enclose_space(job, blocked.parts(), position_shape(job.shape()), closed);
+  }
+  find_enclosed(job, closed.parts(), *job.filled);
+}
 
 }  // namespace
 
 void enclose(BuildJob& job) {
   if (!job.filled || job.filled->is_complete()) return;
-  std::set<Cube> too_large;
-  while (!job.filled->is_complete()) try {
-      Enclosure(job, too_large).run();
-    } catch (const PartTooLarge& part) {
-      too_large.insert(part.cube);
-    }
+  if (job.blocked)
+    enclose_by_cube(job);
+  else
+    enclose_space(job, shell_parts(job), job.shape(), *job.filled);
   job.clock.finish("enclose");
 }
 

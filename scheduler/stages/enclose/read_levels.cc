@@ -47,8 +47,9 @@ class NeededRows {
 
 class LevelsReader {
  public:
-  LevelsReader(const ArtifactReader& artifact, PooledMemory& memory, const CancelToken& cancel)
-      : artifact_(artifact), memory_(memory), cancel_(cancel) {}
+  LevelsReader(const ArtifactReader& artifact, PooledMemory& memory, const CancelToken& cancel,
+               const LevelClip& clip)
+      : artifact_(artifact), memory_(memory), cancel_(cancel), clip_(clip) {}
 
   // Returns the row of the cube's node; nullopt if the cube is empty.
   std::optional<uint32_t> find_row(const Cube& cube) {
@@ -106,9 +107,17 @@ class LevelsReader {
     return frame_.children[at + static_cast<size_t>(popcount8(mask & ((1u << octant) - 1)))];
   }
 
+  // Returns the octants of a level's nodes that are read.
+  uint32_t clipped_octants(uint32_t number) const {
+    const bool is_whole =
+        static_cast<int>(artifact_.shape().grid_levels - number) <= clip_.whole_log2;
+    return is_whole ? 0xff : clip_.octants;
+  }
+
   // Reads the needed rows of a level, and adds their children to `below`.
   NodeLevels::Level read_nodes(uint32_t number, NeededRows& needed, NeededRows& below) {
     const ArtifactLevel& stored = level(number);
+    const uint32_t octants = clipped_octants(number);
     NodeLevels::Level out;
     const uint64_t rows = needed.count();
     out.masks = PooledArray<uint8_t>(memory_, rows);
@@ -123,14 +132,16 @@ class LevelsReader {
         out.children.grow(memory_, children + frame_.children.size());
       size_t at = 0;
       for (uint32_t i = 0; i < frame_.rows; ++i) {
-        const auto count = static_cast<size_t>(popcount8(frame_.masks[i]));
+        const uint32_t mask = frame_.masks[i];
         if (needed.has(info.first_row + i)) {
-          out.masks[out.rows] = frame_.masks[i];
+          out.masks[out.rows] = static_cast<uint8_t>(mask & octants);
           out.first_child[out.rows++] = static_cast<uint32_t>(children);
-          for (size_t c = 0; c < count; ++c)
-            below.add(out.children[children++] = frame_.children[at + c]);
+          size_t child = at;
+          for (uint32_t rest = mask; rest != 0; rest &= rest - 1, ++child)
+            if ((octants >> std::countr_zero(rest) & 1) != 0)
+              below.add(out.children[children++] = frame_.children[child]);
         }
-        at += count;
+        at += static_cast<size_t>(popcount8(frame_.masks[i]));
       }
     }
     below.count();
@@ -155,14 +166,16 @@ class LevelsReader {
   const ArtifactReader& artifact_;
   PooledMemory& memory_;
   const CancelToken& cancel_;
+  const LevelClip clip_;
   Frame frame_;
 };
 
 }  // namespace
 
 std::optional<NodeLevels> read_levels(const ArtifactReader& artifact, const Cube& cube,
-                                      PooledMemory& memory, const CancelToken& cancel) {
-  LevelsReader reader(artifact, memory, cancel);
+                                      PooledMemory& memory, const CancelToken& cancel,
+                                      const LevelClip& clip) {
+  LevelsReader reader(artifact, memory, cancel, clip);
   const auto row = reader.find_row(cube);
   if (!row) return std::nullopt;
   return reader.read(cube.level, *row);

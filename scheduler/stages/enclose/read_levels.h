@@ -10,10 +10,18 @@
 
 namespace voxdag {
 
+// Selects the part of a cube to read: nodes whose edge exceeds 2^whole_log2 voxels keep only the
+// children in `octants`.
+struct LevelClip {
+  uint8_t octants = 0xff;
+  int whole_log2 = 0;
+};
+
 // Reads the nodes in `cube`, which must be inside the cube of one of the artifact's roots. Returns
-// nullopt if no voxel is in the cube. Throws OutOfBudget if the memory is too small,
-// Error{kCorrupt} for a damaged artifact.
+// nullopt if no voxel is in the cube. With a clip, nodes may have no children. Throws OutOfBudget
+// if the memory is too small, Error{kCorrupt} for a damaged artifact.
 std::optional<NodeLevels> read_levels(const ArtifactReader& artifact, const Cube& cube,
-                                      PooledMemory& memory, const CancelToken& cancel);
+                                      PooledMemory& memory, const CancelToken& cancel,
+                                      const LevelClip& clip = {});
 
 }  // namespace voxdag

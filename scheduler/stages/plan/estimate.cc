@@ -129,6 +129,10 @@ PlannedRows planned_rows(const PreparedScene& scene) {
   return rows;
 }
 
+// Returns how often the work folder stores the artifacts of an enclosed solid, in addition to its
+// shell: with a radius, as blocked and as closed positions as well.
+double artifact_copies(const GeometryOptions& options) { return options.radius > 0 ? 3 : 1; }
+
 // The disk space and the memory that only a solid needs.
 struct SolidNeeds {
   EstimateRange disk_bytes, memory_bytes;
@@ -143,7 +147,7 @@ SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scen
   const double subvolumes = static_cast<double>(std::max<size_t>(scene.plan.size(), 1));
   const bool keeps_labels = MemoryPlan::kept_label_bytes(context.budget.limit()) != 0;
   const double in_memory = keeps_labels ? 1 : std::min(1.0, threads / subvolumes);
-  return {kArtifactBytesPerNode * artifact_nodes,
+  return {artifact_copies(options) * kArtifactBytesPerNode * artifact_nodes,
           kEncloseBytesPerNode * in_memory * artifact_nodes};
 }
 
@@ -182,7 +186,8 @@ double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene
   const double triangles = static_cast<double>(scene.state.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
   double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
-  if (options.solid == SolidName::kEnclosed) geometry += kMaxDiskBytesPerNode * octree_nodes;
+  if (options.solid == SolidName::kEnclosed)
+    geometry += artifact_copies(options) * kMaxDiskBytesPerNode * octree_nodes;
   if (solid_rule_of(options) != SolidRule::kNone) geometry += 2 * planned_rows(scene).all;
   if (!options.attributes.any()) return geometry;
   const uint32_t color_levels = levels_of_resolution(options.color_resolution);

@@ -107,10 +107,17 @@ class PilotBuilder {
     CountingSink sink;
     Grid grid = scene_.state.grid;
     grid.levels = counts.levels;
-    summary = fill_pilot(memory, shell.finish(), seed_of(options_, grid), counts.levels, sink);
+    summary = fill_pilot(memory, shell.finish(), seed_of(options_, grid),
+                         pilot_radius(counts.levels), counts.levels, sink);
     counts.interior = static_cast<double>(summary.voxels - shell_voxels);
     add(summary, sink, counts);
     return true;
+  }
+
+  // Returns the build's radius in voxels of the pilot, rounded.
+  uint32_t pilot_radius(uint32_t levels) const {
+    const uint64_t edge = uint64_t{1} << levels, scale = options_.resolution / edge;
+    return static_cast<uint32_t>(std::min((options_.radius + scale / 2) / scale, edge - 1));
   }
 
   bool build_task(const SubvolumeTask& task, TriangleStream& stream, SubDagSink& sink,

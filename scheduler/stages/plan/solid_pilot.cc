@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/popcount8.h"
+#include "core/dag/space/cube_walk.h"
 #include "core/dag/space/enclosed_fill.h"
 #include "core/dag/space/space_labels.h"
 #include "scheduler/solid/row_sums.h"
@@ -80,8 +81,53 @@ NodeLevels ShellLevels::finish() {
   return std::move(levels_);
 }
 
+namespace {
+
+// Returns the nodes of `tables`, which must not be empty.
+NodeLevels take_levels(PooledMemory& memory, SubDagTables& tables) {
+  ShellLevels out(memory);
+  emit_levels(tables, {0, static_cast<uint32_t>(tables.size_log2()), 64}, out);
+  return out.finish();
+}
+
+// Returns the closed positions of the walks of a cube (core/dag/space/cube_walk.h), in a grid of
+// twice the resolution whose last octant is the grid of the voxels.
+NodeLevels closed_positions(PooledMemory& memory, const NodeLevels& shell, uint32_t radius,
+                            uint32_t levels) {
+  const int size_log2 = static_cast<int>(levels);
+  SubDagTables blocked_tables(memory, size_log2 + 1);
+  NodeRef octants[8];
+  for (size_t o = 0; o < 8; ++o) {
+    CubeNeighbors around;
+    around[7 - o].levels = &shell;
+    octants[o] = add_blocked(memory, around, size_log2, radius, blocked_tables);
+  }
+  blocked_tables.add_node(size_log2 + 1, octants);
+  const NodeLevels blocked = take_levels(memory, blocked_tables);
+  SpaceLabels labels(memory, blocked);
+  SubDagTables closed(memory, size_log2 + 1);
+  fill_enclosed(memory, labels, std::vector<uint8_t>(labels.count(0, 0), 1), closed);
+  return take_levels(memory, closed);
+}
+
+SubDagSummary fill_sealed(PooledMemory& memory, const NodeLevels& shell, uint32_t radius,
+                          uint32_t levels, SubDagSink& sink) {
+  const NodeLevels closed = closed_positions(memory, shell, radius, levels);
+  CubeNeighbors around;
+  for (int n = 0; n < 8; ++n)
+    if (closed.has_child(0, 0, 7 - n))
+      around[static_cast<size_t>(n)] = {&closed, 1, closed.child(0, 0, 7 - n)};
+  SubDagTables tables(memory, static_cast<int>(levels));
+  add_enclosed(memory, around, static_cast<int>(levels), radius, tables);
+  return emit_levels(tables, {0, levels, 64}, sink);
+}
+
+}  // namespace
+
 SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell,
-                         const std::optional<Seed>& seed, uint32_t levels, SubDagSink& sink) {
+                         const std::optional<Seed>& seed, uint32_t radius, uint32_t levels,
+                         SubDagSink& sink) {
+  if (radius > 0) return fill_sealed(memory, shell, radius, levels, sink);
   SpaceLabels labels(memory, shell);
   // The faces of the cube are the border of the grid, so all labeled components are outside.
   const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);

@@ -52,9 +52,10 @@ class ShellLevels : public SubDagSink {
   NodeLevels levels_;
 };
 
-// Fills the enclosed space of a grid, or only the space around the build's seed. Throws
-// OutOfBudget.
+// Fills the enclosed space of a grid, or only the space around the build's seed. `radius` is in
+// voxels of the pilot, and 0 in a build with a seed. Throws OutOfBudget.
 SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell,
-                         const std::optional<Seed>& seed, uint32_t levels, SubDagSink& sink);
+                         const std::optional<Seed>& seed, uint32_t radius, uint32_t levels,
+                         SubDagSink& sink);
 
 }  // namespace voxdag

@@ -45,6 +45,7 @@ class Fields {
         ["enclosed", "Enclosed space"]
       ]),
       seed: h("input", {placeholder: "X,Y,Z", autocomplete: "off", on}),
+      radius: this.number({min: "0", max: "16", step: "1", placeholder: "0"}),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
@@ -107,6 +108,7 @@ export class JobOptions {
         field("Cutouts", options.cutouts, "Parts of surfaces that alpha makes invisible."),
         field("Interior", options.solid, "Also sets the voxels inside the surface."),
         field("Seed", options.seed, "A point: fills only the enclosed space around it."),
+        field("Radius", options.radius, "Seals gaps of up to this many voxels."),
         checkRow(flags.skip_invalid, "Skip invalid triangles"), checkRow(flags.thin, "Thin voxels"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,

@@ -1,0 +1,69 @@
+// Tests build and verify with --solid enclosed --radius on a box whose lid has a gap.
+#include "tests/cli/command_line.h"
+
+namespace command_line {
+namespace {
+
+class RadiusOption : public CommandLine {
+ protected:
+  // The box is from 4 to 28 along all axes. The gap has 2 voxels of a grid from 0 to 32.
+  void SetUp() override {
+    std::string text;
+    for (const char* y : {"4", "28"})
+      for (const char* x : {"4", "28", "14.5", "17.5"})
+        for (const char* z : {"4", "28"}) text += std::string("v ") + x + " " + y + " " + z + "\n";
+    // Vertex 8 * (y is 28) + 2 * (index of x) + (z is 28) + 1.
+    text += "f 1 3 4 2\nf 9 11 12 10\nf 1 9 10 2\nf 3 11 12 4\nf 1 3 11 9\n";  // all but z = 28
+    text += "f 2 6 14 10\nf 8 4 12 16\n";  // the lid, without 14.5 < x < 17.5
+    put("box.obj", text);
+  }
+  std::vector<std::string> build(const std::string& radius) const {
+    return {"build", "box.obj", "-r",      "32",       "--bounds", "0,0,0,32",
+            "-o",    "b.vdag",  "--solid", "enclosed", "--radius", radius};
+  }
+};
+
+TEST_F(RadiusOption, SealsGaps) {
+  const Json open = run_json(build("1"));
+  EXPECT_EQ(open["solid"]["interior"], 0);
+  EXPECT_EQ(open["solid"]["radius"], 1);
+  EXPECT_EQ(open["warnings"][0]["code"], "solid-reached");
+  const Json sealed = run_json(build("2"));
+  EXPECT_GE(sealed["solid"]["interior"], 22 * 22 * 22);
+  EXPECT_EQ(sealed["solid"]["radius"], 2);
+  for (const char* seed : {"1", "2", "3", "4"}) {
+    const Json checked = run_json({"verify", "b.vdag", "--against", "box.obj", "--solid",
+                                   "enclosed", "--radius", "2", "--seed", seed});
+    EXPECT_EQ(checked["ok"], true);
+    EXPECT_GT(checked["against"]["interior"]["inside"], 0);
+  }
+  const Json plan = run_json({"plan", "box.obj", "-r", "32", "--bounds", "0,0,0,32", "--solid",
+                              "enclosed", "--radius", "2"});
+  EXPECT_EQ(plan["solid"]["interior"]["likely"], sealed["solid"]["interior"]);
+}
+
+// The solid of another radius is recognized, because its voxels in the gap are not in the shell.
+TEST_F(RadiusOption, VerifyFindsAnotherRadius) {
+  run_json(build("2"));
+  bool is_found = false;
+  for (int seed = 1; seed <= 20 && !is_found; ++seed)
+    is_found = run({"verify", "b.vdag", "--against", "box.obj", "--solid", "enclosed", "--seed",
+                    std::to_string(seed)})
+                   .status == 4;
+  EXPECT_TRUE(is_found);
+}
+
+TEST_F(RadiusOption, RefusedValues) {
+  expect_error(2, "16", build("17"));
+  expect_error(2, "radius", {"build", "box.obj", "-r", "32", "-o", "b.vdag", "--radius", "1"});
+  auto seeded = build("1");
+  seeded.insert(seeded.end(), {"--seed", "16,16,16"});
+  expect_error(2, "seed", seeded);
+  run_json(build("2"));
+  expect_error(
+      2, "16",
+      {"verify", "b.vdag", "--against", "box.obj", "--solid", "enclosed", "--radius", "17"});
+}
+
+}  // namespace
+}  // namespace command_line
