@@ -10,6 +10,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/field.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/routes/routes.h"
 #include "server/disk/data_folder.h"
@@ -96,7 +97,7 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
   add_event_routes(router_);
   add_scene_routes(router_);
   add_system_routes(router_);
-  add_asset_routes(router_, "index.html");
+  add_asset_routes(router_, "index.html", joined(config_.embed_origins, " "));
   add_document_route(router_);
 }
 

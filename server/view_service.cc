@@ -16,6 +16,12 @@ constexpr double kDrainS = 1;
 // replaced.
 constexpr size_t kMaxOpen = 2;
 constexpr size_t kMaxConcurrentTiles = 64;
+// Pages that may show the viewer in a frame: pages of this machine, such as notebooks. The viewer
+// of `voxdag view` only shows the file, so such a page cannot make a user change anything.
+constexpr const char* kEmbedders =
+    "http://localhost:* https://localhost:* http://127.0.0.1:* https://127.0.0.1:*";
+
+std::string file_name_of(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
 }  // namespace
 
@@ -32,14 +38,15 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
        .id = "",
        .subject = "The file: ",
        .manifest_schema = "TileManifest",
-       .packing = Packing::kNone},
+       .packing = Packing::kNone,
+       .file_name = file_name_of(path)},
       [this](const Call&) {
         auto permit = tiles_.acquire("");
         if (!permit) throw busy("too many concurrent requests for tiles: " + tiles_.limits(), 1);
         return TileAccess{open_sources_.open(path_), std::move(permit)};
       },
       stopping_);
-  add_asset_routes(router_, "viewer.html");
+  add_asset_routes(router_, "viewer.html", kEmbedders);
   add_document_route(router_);
 }
 

@@ -11,6 +11,18 @@ namespace voxdag::server {
 namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
+constexpr const char* kExpectedOrigin =
+    "expected an origin, such as https://lab.example.org or http://localhost:8888";
+
+// True for "http://HOST[:PORT]" and "https://HOST[:PORT]". The characters are limited, because
+// header fields contain origins.
+bool is_origin(const std::string& text) {
+  const size_t host = text.starts_with("https://") ? 8 : text.starts_with("http://") ? 7 : 0;
+  constexpr const char* kAllowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-:[]";
+  return host > 0 && host < text.size() &&
+         text.find_first_not_of(kAllowed, host) == std::string::npos;
+}
 
 }  // namespace
 
@@ -56,6 +68,7 @@ void fields(Visitor& visit, ServerConfig& c) {
   visit("token_file", c.token_file);
   visit("scene_roots", c.scene_roots);
   visit("hosts", c.hosts);
+  visit("embed_origins", c.embed_origins);
   visit(Field("drain_timeout_s").at_least(0), c.drain_timeout_s);
   visit.object("tls", [&](auto& tls) {
     tls("certificate_file", c.http.certificate_file);
@@ -128,6 +141,8 @@ void check_config(const ServerConfig& config) {
              std::to_string(config.jobs.max_concurrent) + " jobs of jobs.max_concurrent");
   for (const std::string& root : config.scene_roots)
     expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");
+  for (const std::string& origin : config.embed_origins)
+    expect(is_origin(origin), "embed_origins: '" + origin + "': " + kExpectedOrigin);
 }
 
 }  // namespace voxdag::server

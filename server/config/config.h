@@ -52,6 +52,8 @@ struct ServerConfig {
   std::string token_file;                // "": no tokens; only the loopback has access
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
   std::vector<std::string> hosts;  // names allowed in a Host header in addition to the loopback's
+  // Origins, SCHEME://HOST[:PORT], whose pages may show the viewer in a frame.
+  std::vector<std::string> embed_origins;
   // The program that runs jobs. The default is the running program itself, even if another version
   // was installed under the same name since.
   std::string program = "/proc/self/exe";

@@ -7,9 +7,6 @@ namespace {
 
 using ManifestJson = nlohmann::ordered_json;
 
-// Aspect ratio of the picture for which the camera of a named view is chosen.
-constexpr double kAspect = 16.0 / 9;
-
 ManifestJson point(const query::Vec& voxels, const query::DagView& dag, const GridPlace& place) {
   ManifestJson json = ManifestJson::array();
   for (int axis = 0; axis < 3; ++axis)
@@ -41,8 +38,8 @@ nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string&
 }
 
 nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& views,
-                                 const query::DagView& dag, const GridPlace& place) {
-  const query::Placement p = views.find(view, kAspect, {});
+                                 const query::DagView& dag, const GridPlace& place, double aspect) {
+  const query::Placement p = views.find(view, aspect, {});
   return {{"position", point(p.eye, dag, place)},
           {"target", point(p.target, dag, place)},
           {"fov_degrees", p.fov_degrees}};
@@ -61,9 +58,11 @@ nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const quer
   const query::Box& box = views.box();
   json["box"] = {{"low", box.low.v}, {"high", box.high.v}};
   json["camera"] = camera_of("auto", views, dag, place);
-  for (const std::string& view : query::view_names())
-    if (view != "auto" && view != "inside")
-      json["views"][view] = camera_of(view, views, dag, place);
+  for (const std::string& view : query::view_names()) {
+    if (view == "auto" || view == "inside") continue;
+    json["views"][view] = camera_of(view, views, dag, place);
+    json["tall_views"][view] = camera_of(view, views, dag, place, kTallAspect);
+  }
   return json;
 }
 

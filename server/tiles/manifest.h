@@ -24,10 +24,15 @@ struct GridPlace {
 nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string& digest,
                                    const GridPlace& place, std::optional<uint64_t> root);
 
+// Aspect ratios of the pictures for which the cameras of named views are chosen. Viewers compute
+// the cameras of other pictures from both.
+inline constexpr double kWideAspect = 16.0 / 9, kTallAspect = 1.0 / 2;
+
 // Returns the camera of the named view of a DAG, which must not be empty. Throws the errors of
 // `views`.
 nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& views,
-                                 const query::DagView& dag, const GridPlace& place);
+                                 const query::DagView& dag, const GridPlace& place,
+                                 double aspect = kWideAspect);
 
 // Returns the manifest of a file. Computing the cameras may take a second, or longer if the file is
 // not in memory.

@@ -176,7 +176,7 @@ def check_camera_text(visitor, voxdag, built, camera):
     ), (mine, theirs)
     before, address = visitor.camera(), page.url
     visitor.show(camera, complete=False)
-    page.get_by_label("Take the camera of").fill(f"voxdag render x.vdag {text} --samples 2")
+    page.get_by_label("Move the camera to").fill(f"voxdag render x.vdag {text} --samples 2")
     page.get_by_role("button", name="Show").click()
     size = distance(before["eye"], before["target"])
     assert distance(visitor.camera()["eye"], before["eye"]) < 1e-3 + 1e-6 * size
@@ -185,7 +185,7 @@ def check_camera_text(visitor, voxdag, built, camera):
     assert visitor.camera_text() == text and page.url == address, (
         "the address does not bring the camera back"
     )
-    page.get_by_label("Take the camera of").fill("--camera 1,2")
+    page.get_by_label("Move the camera to").fill("--camera 1,2")
     page.keyboard.press("Enter")
     page.get_by_text("Expected --camera X,Y,Z.").wait_for()
 

@@ -198,7 +198,8 @@ std::vector<Member> manifest_members() {
           {"root", root},
           optional("root_brick", array_of(2, integer(0, UINT32_MAX))),
           optional("box", object({{"low", named("Point")}, {"high", named("Point")}})),
-          optional("camera", named("Camera"))};
+          optional("camera", named("Camera")),
+          optional("tall_views", map_of(named("Camera")))};
 }
 
 void add_manifests(Json& all) {
@@ -208,6 +209,7 @@ void add_manifests(Json& all) {
        {"fov_degrees", {{"type", "number"}, {"exclusiveMinimum", 0}, {"exclusiveMaximum", 180}}}});
   std::vector<Member> members = manifest_members();
   members.push_back({"voxels", pattern("^[0-9]+$")});
+  members.push_back(optional("name", text()));
   members.push_back(
       optional("colors", object({{"levels", integer(2, 20)}, {"batch_max", at_least(1)}})));
   members.push_back(optional("views", map_of(named("Camera"))));

@@ -12,13 +12,17 @@ namespace {
 
 constexpr const char* kPagePolicy =
     "default-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
-    "frame-ancestors 'none'";
+    "frame-ancestors ";
+// The page that other pages may show in a frame, and the query parameter for that.
+constexpr const char* kViewerPage = "viewer.html";
+constexpr const char* kEmbed = "embed";
 
-Response get_asset(Call& call, const Asset& asset) {
+// `ancestors` are the pages that may show the asset in a frame.
+Response get_asset(Call& call, const Asset& asset, const std::string& ancestors = "'none'") {
   Response response;
   response.headers.emplace("ETag", asset.etag);
   response.headers.emplace("Cache-Control", "no-cache");
-  response.headers.emplace("Content-Security-Policy", kPagePolicy);
+  response.headers.emplace("Content-Security-Policy", kPagePolicy + ancestors);
   if (call.request.header("If-None-Match") == asset.etag) {
     response.status = 304;
     return response;
@@ -37,11 +41,15 @@ struct Document {
 
 }  // namespace
 
-void add_asset_routes(Router& router, const std::string& start_page) {
+void add_asset_routes(Router& router, const std::string& start_page, const std::string& embedders) {
   for (const Asset& asset : embedded_assets()) {
     const auto add = [&](const std::string& path) {
       router.add({.method = "GET", .pattern = path, .role = Role::kNone, .accepts_any_query = true},
-                 [&asset](Call& call) { return get_asset(call, asset); });
+                 [&asset, embedders](Call& call) {
+                   const bool is_framed = asset.name == kViewerPage && !embedders.empty() &&
+                                          call.request.target.query.contains(kEmbed);
+                   return get_asset(call, asset, is_framed ? embedders : "'none'");
+                 });
     };
     add('/' + asset.name);
     if (asset.name == start_page) add("/");

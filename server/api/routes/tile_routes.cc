@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/checksum.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
@@ -177,9 +178,15 @@ Response consistent_response(const Call& call, const TileSource& dag, const Answ
   }
 }
 
-Response get_manifest(const TileSource& dag, const CancelToken& stopping) {
+// Returns `manifest`, a JSON object, with the additional member "name" unless `name` is "".
+std::string with_name(const std::string& manifest, const std::string& name) {
+  if (name.empty()) return manifest;
+  return "{\"name\":" + nlohmann::json(printable_line(name)).dump() + "," + manifest.substr(1);
+}
+
+Response get_manifest(const TileSource& dag, const std::string& name, const CancelToken& stopping) {
   try {
-    return json_response(200, dag.manifest(stopping));
+    return json_response(200, with_name(dag.manifest(stopping), name));
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCanceled) throw;
     throw busy("the service is stopping: expected a request after its restart");
@@ -330,7 +337,9 @@ void add_tile_routes(Router& router, const TileRoutes& routes, const OpenTiles& 
                                      {304, "the client has it"}};
   add("/tiles", "Tiles", "grid, cameras, and how tiles are addressed", {},
       {{200, "the manifest", {json_content(routes.manifest_schema)}}},
-      [&stopping](const Call&, const TileSource& dag) { return get_manifest(dag, stopping); });
+      [&stopping, name = routes.file_name](const Call&, const TileSource& dag) {
+        return get_manifest(dag, name, stopping);
+      });
   add("/tiles/batch", "TileBatch", "several tiles, each after its length in bytes",
       {kDigest, kNodes}, tiles, get_batch);
   if (routes.colors == Colors::kServed)

@@ -73,6 +73,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
       query::NamedViews views(planned.view(), never);
       frame["box"] = {{"low", views.box().low.v}, {"high", views.box().high.v}};
       frame["camera"] = camera_of("iso", views, planned.view(), place);
+      frame["tall_views"]["iso"] = camera_of("iso", views, planned.view(), place, kTallAspect);
     }
     return frame;
   } catch (const nlohmann::json::exception&) {

@@ -12,33 +12,35 @@ import {
   parseCameraText
 } from "./camera_text.js";
 import {Controls} from "./controls.js";
+import {framed} from "./framing.js";
+import {markKeyUse} from "./key_use.js";
 import {keysHelp, listenToKeys} from "./keys.js";
 import {Markers} from "./markers.js";
 import {Motion} from "./motion.js";
 import {Panel} from "./panel.js";
-import {length, scale, subtract} from "./vector.js";
+import {length, subtract} from "./vector.js";
 
 const kDefaultFov = 35;
-const kPictureAspect = 16 / 9;  // aspect ratio of the views in the manifest
-const kSeenIntervalMs = 250;    // between two measurements of the visible distance
-const kFirstSeenMs = 2000;      // delay of the first pick, which compiles shaders
+const kSeenIntervalMs = 250;  // between two measurements of the visible distance
+const kFirstSeenMs = 2000;    // delay of the first pick, which compiles shaders
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
   // `renderer` need not be started yet. `places` are the elements {panel, tools, status}. If
-  // `bookmarks` is true, camera motions update the fragment of the page's address. The viewer ends
-  // when `signal` aborts.
-  constructor({canvas, renderer, manifest, places, fileName, signal, bookmarks = true}) {
+  // `bookmarks` is true, camera motions update the fragment of the page's address. `isKeyed` is
+  // true if a key has opened the viewer. The viewer ends when `signal` aborts.
+  constructor(
+      {canvas, renderer, manifest, places, fileName, signal, bookmarks = true, isKeyed = false}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
     this.space = new GridSpace(manifest);
     this.camera = new Camera(manifest.resolution);
     this.options = this.defaultOptions();
     this.seen = {distance: manifest.resolution, time: -Infinity};
     this.motion = new Motion(this.camera, () => this.seen.distance);
-    this.markers = new Markers(canvas.parentElement);
     this.panel = new Panel(this);
+    this.markers = new Markers(canvas, this.panel.pick);
     places.panel.replaceChildren(this.panel.element);
     this.controls = new Controls(
         canvas, this.camera, this.motion, {
@@ -48,6 +50,7 @@ export class Viewer {
           onChange: () => this.schedule(),
         },
         signal);
+    markKeyUse(canvas, isKeyed, signal);
     listenToKeys(
         bookmarks ? window : canvas, canvas, this.motion, this.actions(), () => this.schedule(),
         signal);
@@ -90,19 +93,26 @@ export class Viewer {
   }
 
   firstCamera() {
-    const {camera} = this.manifest;
-    return camera ? this.fit(this.space.placement(camera)) : this.camera.get();
+    const {
+      camera,
+      views =
+      {
+        iso: camera
+      }
+    } = this.manifest;
+    if (!camera) return this.camera.get();
+    const text = JSON.stringify(camera),
+          name = Object.keys(views).find((view) => JSON.stringify(views[view]) === text);
+    return name ? this.namedPlacement(name) : this.space.placement(camera);
   }
 
-  // Returns `placement`, whose eye and target are right for a picture of 16:9. In a narrower
-  // picture, moves an eye outside the grid away from its target until the scene fits.
-  fit(placement) {
-    const aspect = this.canvas.clientWidth / Math.max(1, this.canvas.clientHeight);
-    const outside = placement.eye.some((c) => c < 0 || c > this.manifest.resolution);
-    if (!outside || aspect >= kPictureAspect) return placement;
-    const offset =
-        scale(subtract(placement.eye, placement.target), Math.min(4, kPictureAspect / aspect));
-    return {...placement, eye: placement.target.map((c, axis) => c + offset[axis])};
+  // Returns the placement of a named view that shows the complete scene in the canvas.
+  namedPlacement(name) {
+    const {camera, views = {iso: camera}, tall_views: tall = {}, box} = this.manifest;
+    const {clientWidth, clientHeight} = this.canvas;
+    return framed(
+        this.space.placement(views[name]), tall[name] ? this.space.placement(tall[name]) : null,
+        box, clientWidth / Math.max(1, clientHeight));
   }
 
   actions() {
@@ -159,6 +169,7 @@ export class Viewer {
       this.canvas.focus();
     });
     dialog.showModal();
+    dialog.scrollTop = 0;  // the focus on the button at the end has scrolled the dialog
   }
 
   resize() {
@@ -191,10 +202,7 @@ export class Viewer {
 
   showMarkers() {
     this.overlay?.draw(this.camera);
-    const {pick, start} = this.panel.pick;
-    this.markers.show(
-        [pick?.position, start?.position], this.camera, this.canvas.clientWidth,
-        this.canvas.clientHeight);
+    this.markers.show(this.camera);
   }
 
   applyCamera() {

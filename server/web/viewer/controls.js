@@ -11,6 +11,7 @@ const kDoubleTimeMs = 350;
 const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;  // per pixel of the wheel
 const kAnchorTimeMs = 400;  // wheel events within this time zoom to the same point
+const kAnchorSteps = 6;     // picks between the cursor and the center, if the cursor is on the sky
 const kLinePx = 20;         // pixels per line of a wheel event
 const kRecentMs = 80;       // inertia starts with the mean speed in this last part of a drag
 
@@ -163,8 +164,9 @@ export class Controls {
     else this.handlers.onClick(...at);
   }
 
-  // Zooms to the surface under the cursor. If the cursor is on the sky, zooms to the point under
-  // the cursor at the target's distance.
+  // Zooms to the surface under the cursor. If the cursor is on the sky, zooms to the first surface
+  // between the cursor and the center of the picture, or to the target if there is none. Until the
+  // surface is known, only collects the zoom: a zoom toward the sky could leave the scene.
   handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);
@@ -173,9 +175,14 @@ export class Controls {
     this.findAnchor(at, event.timeStamp);
     const factor =
         Math.exp(Math.min(Math.max(pixels, -600), 600) * kWheelZoom * (event.ctrlKey ? 4 : 1));
-    const {camera, anchor} = this;
-    if (anchor.point) camera.moveTargetToDepthOf(anchor.point);
-    camera.zoomAbout(anchor.point ?? camera.pointAtTarget(...at, ...this.size), factor);
+    this.anchor.factor *= factor;
+    if (this.anchor.point) this.zoomToAnchor(this.anchor);
+  }
+
+  zoomToAnchor(anchor) {
+    this.camera.moveTargetToDepthOf(anchor.point);
+    this.camera.zoomAbout(anchor.point, anchor.factor);
+    anchor.factor = 1;
     this.handlers.onChange();
   }
 
@@ -186,9 +193,22 @@ export class Controls {
       old.time = time;
       return;
     }
-    const anchor = this.anchor = {at, time, point: null};
-    this.handlers.pick(...at).then((point) => {
-      anchor.point = point;
+    const anchor = this.anchor = {at, time, point: null, factor: 1};
+    this.nearestSurface(at).then((point) => {
+      anchor.point = point ?? [...this.camera.target];
+      if (anchor === this.anchor) this.zoomToAnchor(anchor);
     });
+  }
+
+  // Resolves to the first surface on the way from `at` to the center of the picture; null for none.
+  async nearestSurface(at) {
+    const center = this.size.map((c) => c / 2);
+    for (let step = 0; step <= kAnchorSteps; ++step) {
+      const share = step / kAnchorSteps;
+      const point = await this.handlers.pick(
+          at[0] + share * (center[0] - at[0]), at[1] + share * (center[1] - at[1]));
+      if (point) return point;
+    }
+    return null;
   }
 }

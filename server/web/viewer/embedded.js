@@ -15,6 +15,7 @@ const kBudgetBytes = 64 * 2 ** 20;
 // Shows the viewer in `place` until `signal` aborts. If that is not possible, throws an Error and
 // leaves `place` unchanged.
 export async function embedViewer(place, job, signal) {
+  const isKeyed = Boolean(document.activeElement?.matches(":focus-visible"));
   const canvas = h("canvas", {
     class: "scene",
     tabindex: "0",
@@ -48,6 +49,7 @@ export async function embedViewer(place, job, signal) {
       manifest,
       signal,
       bookmarks: false,
+      isKeyed,
       fileName: `job-${job.id}`,
       places: {panel: h("div"), tools, status}
     });

@@ -1,9 +1,10 @@
 // The page of the viewer. viewer.html?job=ID shows a job of the service; viewer.html without a job
-// shows the file of `voxdag view`. ?budget=MiB limits the memory of tiles and colors.
+// shows the file of `voxdag view`. ?budget=MiB limits the memory of tiles and colors. ?embed shows
+// only the picture, for a frame in another page.
 
 import {authorization, getJson, Problem, sleep, token} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
-import {hasEnded, stateText, titleText} from "../lib/format.js";
+import {countText, gridText, hasEnded, stateText, titleText} from "../lib/format.js";
 import {problemBox} from "../views/parts.js";
 
 import {Viewer} from "./app.js";
@@ -22,6 +23,7 @@ const place = (id) => document.getElementById(id);
 const parameters = new URLSearchParams(location.search);
 const askedJob = isPublished() ? null : parameters.get("job");
 const jobId = /^[0-9a-f]{1,32}$/.exec(askedJob ?? "")?.[0] ?? null;
+const isFramed = parameters.has("embed");
 const lifetime = new AbortController();
 
 function budgetBytes() {
@@ -45,9 +47,25 @@ function hideMessage() {
   place("message").hidden = true;
 }
 
-function showTitle(title) {
-  document.title = `${title} · voxdag`;
-  setText(place("title"), title);
+// Shows the title of the page, and below it the size of the file with this manifest.
+function showTitle(title, manifest = null) {
+  const facts = manifest && [
+    gridText(manifest.resolution), manifest.voxels && `${countText(manifest.voxels)} voxels`
+  ].filter(Boolean);
+  document.title = [title, ...(facts ?? []), "voxdag"].join(" · ");
+  clear(place("title"), title, facts && h("span", {class: "title-facts"}, facts.join(" · ")));
+}
+
+// Shows a link to the complete page over the picture of a frame.
+function addWindowLink() {
+  const address = new URL(location.href);
+  address.searchParams.delete("embed");
+  const link =
+      h("a",
+        {class: "button small open-window", target: "_blank", rel: "noopener", href: address.href},
+        "Open");
+  link.addEventListener("click", () => link.href = `${address.href.split("#")[0]}${location.hash}`);
+  place("scene").parentElement.append(link);
 }
 
 // Resolves to the job when it has a result. Also waits for a failed or canceled job, because it may
@@ -174,7 +192,7 @@ async function start() {
     // The manifest is requested first, so that it arrives while the context and the programs are
     // created.
     const arrives = (begun?.manifest ?? source.manifest()).then((manifest) => {
-      if (!job) showTitle(manifest.name ?? "voxdag view");
+      showTitle(job ? titleText(job) : manifest.name ?? "voxdag view", manifest);
       return manifest;
     });
     arrives.catch(() => {});
@@ -189,7 +207,8 @@ async function start() {
       renderer,
       manifest,
       signal: ended.signal,
-      fileName: (job ? titleText(job) : document.title).replace(/[^A-Za-z0-9._-]+/g, "-"),
+      fileName:
+          (job ? titleText(job) : manifest.name ?? "voxdag").replace(/[^A-Za-z0-9._-]+/g, "-"),
       places: {panel: place("panel"), tools: place("tools"), status: place("status")}
     });
     await started;
@@ -264,6 +283,10 @@ function run() {
   });
 }
 
+if (isFramed) {
+  document.body.classList.add("framed");
+  addWindowLink();
+}
 if (jobId) {
   place("home").href = `/#/jobs/${jobId}`;
   setText(place("home-text"), "Job");

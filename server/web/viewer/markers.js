@@ -1,34 +1,57 @@
-// Marks on the picture, at the picked voxel and at the first point of a measurement.
+// Elements over the picture: marks at the picked voxel and at the first point of a measurement, the
+// measured line with its length, and the card at the picked voxel.
 
-import {h} from "../lib/dom.js";
+import {h, setText, svg} from "../lib/dom.js";
 
-import {dot, subtract} from "./vector.js";
+import {PickCard} from "./pick_card.js";
+import {Projection} from "./projection.js";
 
 export class Markers {
-  constructor(stage) {
+  // `picks` is the PickView whose picks are shown.
+  constructor(canvas, picks) {
+    Object.assign(this, {canvas, picks});
     this.marks = ["picked", "start"].map(
         (kind) => h("span", {class: `mark ${kind}`, "aria-hidden": "true", hidden: true}));
-    stage.append(...this.marks);
+    this.lines = ["outline", "line"].map((kind) => svg("line", {class: kind}));
+    this.drawing = svg("svg", {class: "measured", "aria-hidden": "true"}, this.lines);
+    this.label = h("span", {class: "measured-length", "aria-hidden": "true"});
+    this.card = new PickCard(picks, () => canvas.focus({preventScroll: true}));
+    this.elements = [this.drawing, ...this.marks, this.label, this.card.element];
+    this.drawing.style.display = "none";
+    this.label.hidden = true;
+    canvas.parentElement.append(...this.elements);
   }
 
   dispose() {
-    for (const mark of this.marks) mark.remove();
+    for (const element of this.elements) element.remove();
   }
 
-  // `positions`: the picked point and the first point of the measurement, both in voxels. A point
-  // that does not exist is null or undefined.
-  show(positions, camera, width, height) {
-    const {forward, right, up} = camera.axes();
-    const pixel = camera.pixelSpread(height);
-    this.marks.forEach((mark, i) => {
-      const offset = positions[i] ? subtract(positions[i], camera.eye) : null;
-      const depth = offset ? dot(offset, forward) : 0;
-      mark.hidden = !(depth > 0);
-      if (mark.hidden) return;
-      const x = width / 2 + dot(offset, right) / depth / pixel,
-            y = height / 2 - dot(offset, up) / depth / pixel;
-      mark.hidden = !(x >= 0 && x <= width && y >= 0 && y <= height);
-      mark.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+  show(camera) {
+    const {clientWidth: width, clientHeight: height} = this.canvas, {pick, start} = this.picks;
+    const projection = new Projection(camera, width, height);
+    const places = [pick, start].map((shown) => shown && projection.point(shown.position));
+    places.forEach((at, i) => {
+      const isSeen = Boolean(at) && at[0] >= 0 && at[0] <= width && at[1] >= 0 && at[1] <= height;
+      this.marks[i].hidden = !isSeen;
+      if (isSeen) moveTo(this.marks[i], at);
+      if (i === 0) this.card.place(isSeen ? at : null, places[1], width, height);
     });
+    this.showLine(pick && start ? projection.line(start.position, pick.position) : null);
   }
+
+  // Draws the line between two points of the picture; null: none.
+  showLine(ends) {
+    this.drawing.style.display = ends ? "" : "none";
+    this.label.hidden = !ends;
+    if (!ends) return;
+    const [[x1, y1], [x2, y2]] = ends.map((end) => end.map((c) => c.toFixed(1)));
+    for (const line of this.lines)
+      for (const [name, value] of Object.entries({x1, y1, x2, y2})) line.setAttribute(name, value);
+    setText(this.label, this.picks.lengthText());
+    moveTo(this.label, ends[0].map((c, i) => (c + ends[1][i]) / 2));
+  }
+}
+
+function moveTo(element, [x, y]) {
+  element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
 }

@@ -43,7 +43,7 @@ export class Panel {
     const form = h(
         "form", {class: "stack paste"},
         field(
-            "Take the camera of", this.paste, "Options of voxdag render, such as the ones above."),
+            "Move the camera to", this.paste, "Options of voxdag render, such as the ones above."),
         this.pasteError,
         h("div", {class: "buttons"}, h("button", {class: "small"}, "Show"), this.viewsChoice()));
     form.addEventListener("submit", (event) => {
@@ -66,8 +66,7 @@ export class Panel {
           h("option", {value: ""}, "Named view…"),
           Object.keys(views).map((name) => h("option", {value: name}, name)));
     choice.addEventListener("change", () => {
-      if (choice.value)
-        this.viewer.flyTo(this.viewer.fit(this.viewer.space.placement(views[choice.value])));
+      if (choice.value) this.viewer.flyTo(this.viewer.namedPlacement(choice.value));
       choice.value = "";
     });
     return choice;
@@ -131,7 +130,7 @@ export class Panel {
 
   showCamera(text) {
     if (this.cameraText.textContent === text) return;
-    setText(this.cameraText, text);
+    clear(this.cameraText, breakable(text));
     clear(this.copyPlace, copyButton(text, "the camera"));
   }
 
@@ -168,6 +167,16 @@ export class Panel {
     ];
     clear(this.statistics, rows.map(([name, value]) => fact(name, value)));
   }
+}
+
+// Returns `text` as elements that break into lines only after spaces and commas, never in a number
+// or a name.
+function breakable(text) {
+  return text.split(/(?<=[ ,])/)
+      .flatMap(
+          (piece) =>
+              [h("span", {class: "unbroken"}, piece.trimEnd()), piece.endsWith(" ") && " ",
+               h("wbr", {})]);
 }
 
 function part(title, content, open = false) {

@@ -49,10 +49,20 @@ export class PickView {
     return this.space.resolution / 2 ** level;
   }
 
+  // Returns the place of a pick in scene units.
+  sceneText(pick) {
+    return this.space.text(pick.position).replaceAll(",", ", ");
+  }
+
+  measuredVoxels() {
+    return distance(this.pick.position, this.start.position);
+  }
+  lengthText() {
+    return `${lengthText(this.measuredVoxels())} voxels`;
+  }
   measureText() {
-    const voxels = distance(this.pick.position, this.start.position);
-    return `${lengthText(voxels)} voxels, ${
-        lengthText(voxels * this.space.edge / this.space.resolution)} in scene units`;
+    const inScene = this.measuredVoxels() * this.space.edge / this.space.resolution;
+    return `${this.lengthText()}, ${lengthText(inScene)} in scene units`;
   }
 
   show() {
@@ -64,10 +74,7 @@ export class PickView {
         pick &&
             h("dl", {class: "facts pick"},
               fact("Voxel", h("code", {"data-fact": "voxel"}, pick.voxel.join(", "))),
-              fact(
-                  "In scene units",
-                  h("code", {"data-fact": "scene"},
-                    this.space.text(pick.position).replaceAll(",", ", "))),
+              fact("In scene units", h("code", {"data-fact": "scene"}, this.sceneText(pick))),
               fact(
                   "Level", h("span", {"data-fact": "level"}, String(pick.level)),
                   this.edgeNote(pick)),

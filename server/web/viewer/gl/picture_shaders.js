@@ -22,11 +22,11 @@ layout(location = 0) out uvec4 o_hit;
 layout(location = 1) out uint o_color;
 #endif
 
-uvec4 pack_hit(bool found, Hit hit, uint steps, bool wire, uint slot) {
+uvec4 pack_hit(bool found, Hit hit, uint steps, float wire, uint slot) {
   uint axis = hit.axis < 0 ? 3u : uint(hit.axis);
   return uvec4(found ? floatBitsToUint(hit.t) : 0u,
                min(steps, 65535u) | uint(hit.scale) << 16 | axis << 21 | (found ? 1u << 23 : 0u) |
-                   (wire ? 1u << 24 : 0u),
+                   uint(wire * 255.0 + 0.5) << 24,
                found ? hit.missing : 0u, slot);
 }
 
@@ -51,7 +51,7 @@ void main() {
       found && u_color_levels >= 0 ? color_of_cell(hit_cell, hit.scale, hit.missing == 0u) : 0u;
 #endif
 #ifdef PICK
-  o_hit = pack_hit(found, hit, uint(step_count), false, entered_slot);
+  o_hit = pack_hit(found, hit, uint(step_count), 0.0, entered_slot);
   uint slot = 0u;
   for (int s = hit.scale + 1; s < u_levels && slot == 0u; ++s)
     if ((u_boundaries >> s & 1u) != 0u) slot = picked_slots[s];
@@ -417,8 +417,9 @@ void main() {
       }
     }
   }
-  if (wire_in(g))
-    color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, 0.7), max(color.a, 0.7));
+  float wire = 0.7 * wire_in(g);
+  if (wire > 0.0)
+    color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, wire), max(color.a, wire));
   o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
 }`;
 

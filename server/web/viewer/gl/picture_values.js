@@ -37,6 +37,7 @@ export function pictureValues(renderer, width, height, lodHeight) {
     u_jitter: [0, 0],
     u_wire_scale: options.wireLevel === null ? -1 : levels - options.wireLevel,
     u_wire_width: view.pixel(height),
+    u_wire_fade: [light.distanceOfScene(view.eye), 1 / Math.max(1, light.diagonal)],
     u_sun: light.sun,
     u_sky_reach: light.skyReach,
     u_haze: [light.hazeStart, 1 / Math.max(1, light.diagonal)],

@@ -65,7 +65,10 @@ uint entered_count = 0u, entered_slot = 0u;  // slot of a random tile among all 
 #ifdef WIRE
 uniform int u_wire_scale;  // scale of the cubes whose edges are drawn; -1: none
 uniform float u_wire_width;  // half the width of a line at distance 1
-bool wire = false;
+uniform vec2 u_wire_fade;     // distance at which lines begin to fade, and 1 / length of the fade
+float wire = 0.0;  // how strongly the pixel shows a line, 0 to 1
+const float kFront = 0.4;                   // share of a line in front of a nearer-to-surface cube
+const float kHidden = 4.0, kClear = 20.0;  // widths in pixels of cubes without and with clear lines
 #endif
 #ifdef CELL
 ivec3 hit_cell = ivec3(0);   // low corner of the cell that was hit
@@ -103,14 +106,20 @@ void note_tile(uint slot) {
 }
 
 #ifdef WIRE
-// Sets wire if the ray enters the cell near an edge of the cell's face.
+// Updates wire when the ray enters an occupied cell. A line is near an edge of the cell's face.
+// Lines fade with their distance, where cubes are only a few pixels wide, and in front of further
+// cubes, because they would hide the surface otherwise.
 void note_wire(ivec3 position, int scale, int axis, float t) {
   if (scale != u_wire_scale || axis < 0) return;
+  wire *= kFront;
   vec3 inward = (t - time_of(position)) / ray_inverse;
   vec3 outward = (time_of(position + (1 << scale)) - t) / ray_inverse;
   vec3 nearest = min(inward, outward);
   nearest += vec3(equal(ivec3(axis), ivec3(0, 1, 2))) * 1e30;
-  if (min(nearest.x, min(nearest.y, nearest.z)) < u_wire_width * t) wire = true;
+  if (min(nearest.x, min(nearest.y, nearest.z)) >= u_wire_width * t) return;
+  float pixels = float(1 << scale) / (u_wire_width * t);
+  wire = max(wire, smoothstep(kHidden, kClear, pixels) *
+                       exp(-2.0 * max(0.0, t - u_wire_fade.x) * u_wire_fade.y));
 }
 #endif
 
@@ -242,7 +251,7 @@ vec3 direction_of(vec2 point) {
 }
 
 bool found_in(uvec4 g) { return (g.y >> 23 & 1u) != 0u; }
-bool wire_in(uvec4 g) { return (g.y >> 24 & 1u) != 0u; }
+float wire_in(uvec4 g) { return float(g.y >> 24) / 255.0; }
 float t_in(uvec4 g) { return uintBitsToFloat(g.x); }
 float size_in(uvec4 g) { return float(1 << int(g.y >> 16 & 31u)); }
 int axis_in(uvec4 g) { return int(g.y >> 21 & 3u); }

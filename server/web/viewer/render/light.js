@@ -33,6 +33,10 @@ export class Light {
       u_floor_center: subtract(center, eye)
     };
   }
+  // Returns the distance from a camera at `eye` to the box of the scene.
+  distanceOfScene(eye) {
+    return length(eye.map((x, i) => Math.max(this.low[i] - x, 0, x - this.high[i])));
+  }
   get diagonal() {
     return length(subtract(this.high, this.low));
   }

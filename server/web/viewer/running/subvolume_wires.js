@@ -2,7 +2,7 @@
 // differ by line style, not by color alone. Lines behind surfaces are also visible, because the
 // depth on the GPU is not used.
 
-import {dot, subtract} from "../vector.js";
+import {Projection} from "../projection.js";
 
 const kMaxEdges = 24000;  // with more edges, only active subvolumes are drawn
 const kOpaque = 10;       // up to kOpaque^2 cubes of one kind are drawn opaque
@@ -81,7 +81,7 @@ export class SubvolumeWires {
     const pen = canvas.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
-    const project = this.projection(camera, width, height);
+    const projection = new Projection(camera, width, height, kNear * this.resolution / 16);
     for (const state of kOrder) {
       const {color, width: line, dash} = kStyles[state];
       pen.strokeStyle = color;
@@ -91,35 +91,14 @@ export class SubvolumeWires {
       pen.globalAlpha = Math.min(1, Math.max(0.25, kOpaque / Math.sqrt(this.counts[state])));
       pen.beginPath();
       const points = this.edges[state];
-      for (let i = 0; i < points.length; i += 6) project(pen, points, i);
+      for (let i = 0; i < points.length; i += 6) {
+        const ends = projection.line(points.subarray(i, i + 3), points.subarray(i + 3, i + 6));
+        if (!ends) continue;
+        pen.moveTo(...ends[0]);
+        pen.lineTo(...ends[1]);
+      }
       pen.stroke();
     }
-  }
-
-  // Returns a function (pen, points, i) that adds the visible part of an edge to the path of the
-  // pen. The edge's two ends are the six numbers of `points` from index i.
-  projection(camera, width, height) {
-    const {forward, right, up} = camera.axes(), eye = camera.eye,
-                           pixel = camera.pixelSpread(height);
-    const near = kNear * this.resolution / 16;
-    const place = (points, at) => {
-      const offset = subtract([points[at], points[at + 1], points[at + 2]], eye);
-      return [dot(offset, right), dot(offset, up), dot(offset, forward)];
-    };
-    const cut = (from, to) => {
-      const share = (near - from[2]) / (to[2] - from[2]);
-      return from.map((c, i) => c + share * (to[i] - c));
-    };
-    const toPixels =
-        ([x, y, depth]) => [width / 2 + x / depth / pixel, height / 2 - y / depth / pixel];
-    return (pen, points, i) => {
-      let a = place(points, i), b = place(points, i + 3);
-      if (a[2] < near && b[2] < near) return;
-      if (a[2] < near) a = cut(a, b);
-      if (b[2] < near) b = cut(b, a);
-      pen.moveTo(...toPixels(a));
-      pen.lineTo(...toPixels(b));
-    };
   }
 
   dispose() {
