@@ -158,7 +158,12 @@ Response Service::answer(Request& request) {
   Response response;
   try {
     if (config_.before_step) config_.before_step("answer " + request.method);
-    response = router_.route(request, access_);
+    if (access_.cross_origin().is_preflight(request)) {
+      access_.admit(request, Role::kNone);
+      response = CrossOrigin::preflight_response();
+    } else {
+      response = router_.route(request, access_);
+    }
   } catch (const std::exception& error) {
     const Problem problem = public_problem(error);
     if (problem.detail != error.what())  // clients do not receive this text
@@ -170,6 +175,7 @@ Response Service::answer(Request& request) {
     log_("request " + request.id + " " + request.method + " failed: an unknown exception");
     response = problem_response(public_problem(std::exception()));
   }
+  access_.cross_origin().add_headers(request, response);
   if (!router_.is_documented(request, response.status))
     log_("request " + request.id + " " + request.method +
          ": the OpenAPI document lacks the status " + std::to_string(response.status));
@@ -179,7 +185,7 @@ Response Service::answer(Request& request) {
 
 void Service::record(const Request& request, int status, double start_s) {
   metrics_.count_request(status, wall_seconds() - start_s);
-  if (request.method == "GET" || request.method == "HEAD") return;
+  if (request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS") return;
   log_("audit " + request.method + " " + shown(request.target.path) + " status=" +
        std::to_string(status) + " who=" + (request.caller.empty() ? "-" : request.caller) +
        " from=" + request.peer + " request=" + request.id);

@@ -44,11 +44,13 @@ FieldJson numbers_schema(const Field& field, size_t count) {
   FieldJson items = FieldJson::array();
   for (size_t i = 0; i < count; ++i) items.push_back({{"type", "number"}});
   if (field.is_above_zero) items.back()["exclusiveMinimum"] = 0;
+  // maxItems excludes further items, so `items` only names the type: generators of clients need it,
+  // and do not accept the schema "false".
   return {{"type", "array"},
           {"minItems", count},
           {"maxItems", count},
           {"prefixItems", items},
-          {"items", false}};
+          {"items", {{"type", "number"}}}};
 }
 
 }  // namespace voxdag::json_fields

@@ -69,6 +69,7 @@ void fields(Visitor& visit, ServerConfig& c) {
   visit("scene_roots", c.scene_roots);
   visit("hosts", c.hosts);
   visit("embed_origins", c.embed_origins);
+  visit("cors_origins", c.cors_origins);
   visit(Field("drain_timeout_s").at_least(0), c.drain_timeout_s);
   visit.object("tls", [&](auto& tls) {
     tls("certificate_file", c.http.certificate_file);
@@ -143,6 +144,8 @@ void check_config(const ServerConfig& config) {
     expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");
   for (const std::string& origin : config.embed_origins)
     expect(is_origin(origin), "embed_origins: '" + origin + "': " + kExpectedOrigin);
+  for (const std::string& origin : config.cors_origins)
+    expect(is_origin(origin), "cors_origins: '" + origin + "': " + kExpectedOrigin);
 }
 
 }  // namespace voxdag::server

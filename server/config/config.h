@@ -54,6 +54,8 @@ struct ServerConfig {
   std::vector<std::string> hosts;  // names allowed in a Host header in addition to the loopback's
   // Origins, SCHEME://HOST[:PORT], whose pages may show the viewer in a frame.
   std::vector<std::string> embed_origins;
+  // Origins whose pages may use the API.
+  std::vector<std::string> cors_origins;
   // The program that runs jobs. The default is the running program itself, even if another version
   // was installed under the same name since.
   std::string program = "/proc/self/exe";

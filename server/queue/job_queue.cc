@@ -9,6 +9,7 @@
 #include "server/base/json_text.h"
 #include "server/base/warning_json.h"
 #include "server/disk/store.h"
+#include "server/queue/search_sql.h"
 
 namespace voxdag::server {
 
@@ -301,8 +302,17 @@ std::vector<Job> JobQueue::query(const std::string& rest, const std::vector<int6
 
 std::vector<Job> JobQueue::list(const JobFilter& filter) {
   const std::string states = filter.states.empty() ? "" : " AND " + states_in(filter.states);
-  return query("WHERE number < ?" + states + " ORDER BY number DESC LIMIT ?",
-               {filter.before, static_cast<int64_t>(filter.limit)});
+  std::lock_guard lock(read_mutex_);
+  auto rows = select_rows<JobRow>(reader_, "job",
+                                  "WHERE number < ?1" + states + " AND " + kHasWords + " AND " +
+                                      kHasLabel + " ORDER BY number DESC LIMIT ?2");
+  rows.bind(0, filter.before)
+      .bind(1, static_cast<int64_t>(filter.limit))
+      .bind(2, filter.words)
+      .bind(3, filter.label);
+  std::vector<Job> jobs;
+  while (rows.step()) jobs.push_back(read_job(rows));
+  return jobs;
 }
 
 std::map<JobState, uint64_t> JobQueue::counts() {

@@ -1,11 +1,13 @@
 // The frame of all pages: routing by URL fragment, the login, the menu.
 
-import {getJson, Problem, request, token} from "./lib/api.js";
+import {authorization, getJson, Problem, request, token} from "./lib/api.js";
 import {clear, h, setText} from "./lib/dom.js";
+import {sizeText} from "./lib/format.js";
 import {jobPage} from "./pages/job_page.js";
 import {jobsPage} from "./pages/jobs_page.js";
 import {loginPage} from "./pages/login_page.js";
 import {newJobPage} from "./pages/new_job_page.js";
+import {scenesPage} from "./pages/scenes_page.js";
 import {problemBox} from "./views/parts.js";
 
 const main = document.getElementById("main");
@@ -16,6 +18,7 @@ let pageLifetime = new AbortController();  // aborts the requests of the page th
 const kRoutes = [
   [/^\/$/, "jobs", jobsPage],
   [/^\/new$/, "new", newJobPage],
+  [/^\/scenes$/, "scenes", scenesPage],
   [/^\/jobs\/([0-9a-f]{1,32})$/, "job", jobPage],
 ];
 
@@ -49,7 +52,10 @@ function route({focus = true} = {}) {
   if (focus) main.focus({preventScroll: true});
 }
 
-window.addEventListener("hashchange", () => route());
+window.addEventListener("hashchange", () => {
+  route();
+  showMachine().catch(() => {});
+});
 window.addEventListener("voxdag-login", () => {
   const tokenRejected = Boolean(token.get());
   token.remove();
@@ -60,7 +66,22 @@ signOut.addEventListener("click", async () => {
   await request("GET", "/api/v1/jobs?limit=1").catch(() => {});
 });
 
+// Shows the version, and facts about the machine if the user may read them.
+async function showMachine() {
+  const place = document.getElementById("version");
+  const {version} = await getJson("/version");
+  setText(place, `voxdag ${version}`);
+  // Without a token, a service with tokens would answer 401, and the login page would open.
+  const response = await fetch("/api/v1/machine", {headers: authorization()});
+  if (!response.ok) return;
+  const machine = await response.json();
+  setText(place, [
+    `voxdag ${version}`,
+    `${machine.cores} ${machine.cores === 1 ? "core" : "cores"}`,
+    `${sizeText(machine.job_memory_bytes)} of memory for jobs`,
+    `${sizeText(machine.free_disk_bytes)} of disk free`,
+  ].join(" · "));
+}
+
 route({focus: false});
-getJson("/version")
-    .then(({version}) => setText(document.getElementById("version"), `voxdag ${version}`))
-    .catch(() => {});
+showMachine().catch(() => {});

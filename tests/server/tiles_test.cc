@@ -84,7 +84,8 @@ TEST_F(Tiles, HaveAManifest) {
   EXPECT_EQ(manifest_["digest"].get<std::string>().size(), 32u);
   EXPECT_TRUE(levels_ >= 1 && levels_ <= query::kMaxTileLevels);
   for (const char* view : {"iso", "front", "top"})
-    EXPECT_EQ(manifest_["views"][view]["position"].size(), 3u) << view;
+    for (const char* shape : {"views", "tall_views"})
+      EXPECT_EQ(manifest_[shape][view]["position"].size(), 3u) << view;
   EXPECT_GT(manifest_["camera"]["fov_degrees"], 0);
   for (size_t axis = 0; axis < 3; ++axis) {
     const double low = manifest_["box"]["low"][axis], high = manifest_["box"]["high"][axis];
@@ -303,6 +304,12 @@ TEST_F(View, ServesTheFileAndTheAssets) {
   const ClientResponse tile =
       http_->get("/api/v1/view/tiles/0/0?v=" + m["digest"].get<std::string>());
   EXPECT_TRUE(tile.body == tile_bytes(path_, m["tile_levels"], 0, 0));
+  EXPECT_EQ(m["name"], "m.vdag");
+  const auto has = [&](const std::string& path, const char* sources) {
+    return http_->get(path).header("Content-Security-Policy").find(sources) != std::string::npos;
+  };
+  EXPECT_TRUE(has("/", "frame-ancestors 'none'"));
+  EXPECT_TRUE(has("/?embed", "frame-ancestors http://localhost:*"));
   EXPECT_EQ(http_->get("/lib/dom.js").header("Content-Type"), "text/javascript; charset=utf-8");
   EXPECT_EQ(http_->get("/api/v1/jobs").status, 404);
   EXPECT_EQ(http_->send("POST", "/api/v1/view/tiles", "{}").status, 405);

@@ -40,6 +40,7 @@ Problem unauthorized(const std::string& detail) {
 
 AccessControl::AccessControl(const ServerConfig& config, FileSystem& files)
     : hosts_(config.hosts),
+      cross_origin_(config.cors_origins),
       requests_(config.transfers.max_requests_per_s),
       wrong_tokens_(kWrongTokensPerSecond) {
   if (!config.token_file.empty()) tokens_ = Tokens::read(files, config.token_file);
@@ -60,6 +61,7 @@ void AccessControl::check_site(const Request& request) const {
                   "the Host header '" + printable(host) +
                       "' does not name this service: expected its address or one of hosts in the "
                       "configuration");
+  if (cross_origin_.allows(request)) return;
   // A browser hides the answer to a cross-site request from the page. But the page could still
   // waste the service's time, and could infer existing names from response times.
   const auto& segments = request.target.segments;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/api/access/cross_origin.h"
 #include "server/api/access/rate_limiter.h"
 #include "server/api/access/tokens.h"
 #include "server/config/config.h"
@@ -23,12 +24,16 @@ class AccessControl {
   // `needed` or for a wrong Host or Origin, and 429 above a rate limit.
   Caller admit(Request& request, Role needed);
 
+  // The pages of other origins that may use the API.
+  const CrossOrigin& cross_origin() const { return cross_origin_; }
+
  private:
   void check_site(const Request& request) const;
   Caller identify(const Request& request);
 
   std::optional<Tokens> tokens_;
   std::vector<std::string> hosts_;
+  const CrossOrigin cross_origin_;
   RateLimiter requests_;
   RateLimiter wrong_tokens_;
 };

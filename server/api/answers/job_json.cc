@@ -36,13 +36,15 @@ std::string links(const std::string& self) {
   return text + ",\"preview\":\"" + self + "/preview.png\"}";
 }
 
-// Returns the JSON members "scene", "resolution" and "options" of a stored request. Leaves out any
-// other members, which a damaged record may contain.
+// Returns the JSON members "scene", "resolution", "options" and "labels" of a stored request.
+// Leaves out any other members, which a damaged record may contain.
 std::string request_members(const std::string& request) {
   using nlohmann::ordered_json;
   const auto stored = ordered_json::parse(request, nullptr, false);
-  ordered_json members = {
-      {"scene", ordered_json::array()}, {"resolution", 0}, {"options", ordered_json::object()}};
+  ordered_json members = {{"scene", ordered_json::array()},
+                          {"resolution", 0},
+                          {"options", ordered_json::object()},
+                          {"labels", ordered_json::array()}};
   for (const auto& [name, value] : members.items())
     if (stored.contains(name)) value = stored[name];
   make_printable(members);

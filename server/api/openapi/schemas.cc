@@ -148,6 +148,7 @@ void add_jobs(Json& all) {
                        {"scene", array(text())},
                        {"resolution", count()},
                        {"options", type("object")},
+                       {"labels", array(text())},
                        {"priority", integer()},
                        {"attempts", count()},
                        {"max_attempts", count()},
@@ -165,6 +166,17 @@ void add_jobs(Json& all) {
   all["JobList"] = object({{"jobs", array(named("Job"))},
                            {"next_cursor", or_null("string")},
                            {"counts", map_of(count())}});
+}
+
+void add_machine(Json& all) {
+  all["Machine"] = object({{"version", text()},
+                           {"cores", at_least(1)},
+                           {"job_memory_bytes", count()},
+                           {"max_concurrent_jobs", at_least(1)},
+                           {"running_jobs", count()},
+                           {"free_disk_bytes", count()},
+                           {"min_free_disk_bytes", count()},
+                           {"uptime_s", number()}});
 }
 
 void add_plan(Json& all) {
@@ -239,8 +251,8 @@ void add_subvolumes(Json& all) {
 
 Json make_schemas() {
   Json all;
-  for (const auto add : {add_common, add_scenes, add_requests, add_progress, add_jobs, add_plan,
-                         add_manifests, add_subvolumes})
+  for (const auto add : {add_common, add_scenes, add_requests, add_progress, add_jobs, add_machine,
+                         add_plan, add_manifests, add_subvolumes})
     add(all);
   return all;
 }

@@ -5,6 +5,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "core/base/text/printable.h"
 #include "core/format/checksum.h"
 #include "core/io/random_id.h"
 #include "scene/messages.h"
@@ -38,6 +39,10 @@ const Parameter kReplayed = {"Idempotent-Replayed", "true if the key was used be
 const Parameter kJobLimit = {"limit", "maximum number of entries", "", IntegerRange{1, 200, 50}};
 const Parameter kJobCursor = {"cursor", "next_cursor of the previous page", "",
                               IntegerRange{1, INT64_MAX, INT64_MAX}};
+const Parameter kJobWords = {
+    "q", "text in the name, the scenes or the labels, or at the beginning of the id", "^.{0,100}$"};
+const Parameter kJobLabel = {"label", "a label of the jobs", "^.{0,64}$"};
+constexpr size_t kMaxSearchBytes = 400;  // 100 characters
 const Parameter kJobStates = {"state", "comma-separated list of states", [] {
                                 std::string states = kJobStateNames[0];
                                 for (size_t i = 1; i < kJobStateNames.size(); ++i)
@@ -217,10 +222,20 @@ Response post_job(Context& context, Call& call) {
   return accepted(context, added.job, added.replayed);
 }
 
+std::string search_text(const Call& call, const Parameter& parameter) {
+  const std::string text = call.query(parameter.name);
+  if (text.size() > kMaxSearchBytes || !is_printable(text))
+    throw bad_request("'" + parameter.name + "' is '" + printable(text) +
+                      "': expected at most 100 printable characters");
+  return text;
+}
+
 JobFilter filter_of(const Call& call) {
   JobFilter filter;
   filter.limit = call.query_integer(kJobLimit);
   filter.before = static_cast<int64_t>(call.query_integer(kJobCursor));
+  filter.words = search_text(call, kJobWords);
+  filter.label = search_text(call, kJobLabel);
   if (!call.request.target.query.contains("state")) return filter;
   const std::string states = call.query("state");
   for (size_t begin = 0; begin <= states.size();) {
@@ -347,7 +362,7 @@ void add_list_routes(Router& router) {
               .id = "listJobs",
               .summary = "Jobs, newest first",
               .tag = "jobs",
-              .query = {kJobStates, kJobLimit, kJobCursor},
+              .query = {kJobStates, kJobWords, kJobLabel, kJobLimit, kJobCursor},
               .answers = {{200,
                            "a page of jobs; it has fewer than limit if they are long",
                            {json_content("JobList")}}}},

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
@@ -97,6 +98,19 @@ Response get_metrics(Context& context, double started_s) {
                        context.metrics.text(context.queue.counts(), std::move(samples)));
 }
 
+Response get_machine(Context& context, double started_s) {
+  const nlohmann::ordered_json json = {
+      {"version", VOXDAG_VERSION},
+      {"cores", default_threads()},
+      {"job_memory_bytes", context.tasks.memory_bytes()},
+      {"max_concurrent_jobs", context.config.jobs.max_concurrent},
+      {"running_jobs", context.dispatcher.running()},
+      {"free_disk_bytes", context.disk.free()},
+      {"min_free_disk_bytes", context.config.jobs.min_free_disk_bytes},
+      {"uptime_s", wall_seconds() - started_s}};
+  return json_response(200, json.dump());
+}
+
 }  // namespace
 
 void add_system_routes(Router& router) {
@@ -121,6 +135,11 @@ void add_system_routes(Router& router) {
   add("/version", Role::kNone, "version", "Versions of the program and the API",
       {200, "versions", {json_content()}}, [](Context&, Call&) {
         return json_response(200, "{\"version\":\"" VOXDAG_VERSION "\",\"api\":\"v1\"}");
+      });
+  add("/api/v1/machine", Role::kRead, "machine", "The machine and its limits for jobs",
+      {200, "the machine", {json_content("Machine")}},
+      [started_s = wall_seconds()](Context& context, Call&) {
+        return get_machine(context, started_s);
       });
   add("/metrics", Role::kRead, "metrics", "Metrics in the Prometheus text format",
       {200, "metrics", {{"text/plain"}}}, [started_s = wall_seconds()](Context& context, Call&) {

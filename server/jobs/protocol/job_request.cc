@@ -42,9 +42,11 @@ JobRequest parse_job_request(std::string_view body) {
     JobRequest request;
     const FieldJson json = read_body(body, request);
     check_options(request.spec);
-    request.text = json_text(FieldJson{{"scene", request.scenes},
-                                       {"resolution", request.spec.geometry.resolution},
-                                       {"options", json.value("options", FieldJson::object())}});
+    FieldJson stored = {{"scene", request.scenes},
+                        {"resolution", request.spec.geometry.resolution},
+                        {"options", json.value("options", FieldJson::object())}};
+    if (!request.labels.empty()) stored["labels"] = request.labels;
+    request.text = json_text(stored);
     return request;
   });
 }

@@ -12,10 +12,11 @@ namespace voxdag::server {
 
 struct JobRequest {
   std::string name;
+  std::vector<std::string> labels;  // for searches
   int priority = 0;
   std::vector<std::string> scenes;  // names of uploads or absolute paths
   BuildSpec spec;                   // without scenes, output and work folder
-  std::string text;                 // JSON of scene, resolution and options, as submitted
+  std::string text;                 // JSON of scene, resolution, options and labels, as submitted
 };
 
 inline constexpr Field kPriorityField = Field("priority", "higher runs earlier").range(-100, 100);
@@ -25,6 +26,7 @@ void fields(Visitor& visit, JobRequest& request) {
   visit(kSceneField.line(4096).items(64), request.scenes);
   visit(kResolutionField, request.spec.geometry.resolution);
   visit(Field("name", "name of the job, for people").line(200).omit_empty(), request.name);
+  visit(Field("labels", "texts to find the job by").line(64).items(16), request.labels);
   visit(kPriorityField, request.priority);
   visit.object("options", [&](auto& options) { visit_job_options(options, request.spec); });
 }

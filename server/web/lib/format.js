@@ -101,7 +101,7 @@ export function hasEnded(state) {
   return ["canceled", "failed", "succeeded"].includes(state);
 }
 
-// Returns the completed fraction of the current stage, 0 to 1; null if it is unknown.
-export function doneFraction(progress) {
-  return progress && progress.total > 0 ? Math.min(1, progress.done / progress.total) : null;
+// Returns the labels of a job as text: "#a #b"; "" for none.
+export function labelsText(job) {
+  return (job.labels ?? []).map((label) => `#${label}`).join(" ");
 }

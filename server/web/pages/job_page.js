@@ -106,6 +106,7 @@ class JobPage {
     this.showHead();
     if (changed) this.showActions();
     clear(this.places.error, errorBox(job));
+    if (changed) this.showParts(job);
     clear(
         this.places.warnings,
         job.warnings.length > 0 &&
@@ -125,8 +126,25 @@ class JobPage {
     this.timeline.show(this.job);
     this.cluster.show(this.job);
     this.rate.add(this.job);
-    this.rateCard.hidden = this.rate.empty && hasEnded(this.job.state);
+    this.showParts(this.job);
     this.cubes.update(this.job);
+  }
+
+  // Hides the cards that have nothing to show because the job ended before. The log of a failed job
+  // is next to its error, and open.
+  showParts(job) {
+    const ended = hasEnded(job.state), stages = job.progress?.stages ?? [];
+    this.rateCard.hidden = this.rate.empty && ended;
+    this.stagesCard.hidden = ended && stages.length === 0;
+    this.cubesCard.hidden = ended && !(job.progress?.subvolumes?.total > 0);
+    this.columns.classList.toggle("one", this.cubesCard.hidden);
+    const fails = job.state === "failed";
+    if (fails && !this.hasFailed) {
+      this.places.error.after(this.log.element);
+      this.log.element.open = true;
+    }
+    if (!fails && this.hasFailed) this.element.append(this.log.element);
+    this.hasFailed = fails;
   }
 
   async reload() {
@@ -138,19 +156,22 @@ class JobPage {
     clear(
         this.element, this.element.firstChild, this.places.head, this.places.actions,
         this.places.error, this.places.warnings, this.progress.element, this.places.result,
-        h("div", {class: "two"},
-          h("div", {class: "stack"},
-            h("section", {class: "card", "aria-labelledby": "stages-title"},
-              h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
-            this.cluster.element,
-            this.rateCard =
-                h("section", {class: "card", "aria-labelledby": "rate-title"},
-                  h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
-            h("section", {class: "card", "aria-labelledby": "about-title"},
-              h("h2", {id: "about-title"}, "About this job"),
-              this.about = h("dl", {class: "facts"}))),
-          h("section", {class: "card", "aria-labelledby": "cubes-title"},
-            h("h2", {id: "cubes-title"}, "Subvolumes"), this.cubes.element)),
+        this.columns =
+            h("div", {class: "two"},
+              h("div", {class: "stack"},
+                this.stagesCard =
+                    h("section", {class: "card", "aria-labelledby": "stages-title"},
+                      h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
+                this.cluster.element,
+                this.rateCard =
+                    h("section", {class: "card", "aria-labelledby": "rate-title"},
+                      h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
+                h("section", {class: "card", "aria-labelledby": "about-title"},
+                  h("h2", {id: "about-title"}, "About this job"),
+                  this.about = h("dl", {class: "facts"}))),
+              this.cubesCard =
+                  h("section", {class: "card", "aria-labelledby": "cubes-title"},
+                    h("h2", {id: "cubes-title"}, "Subvolumes"), this.cubes.element)),
         this.log.element);
   }
 
@@ -167,6 +188,12 @@ class JobPage {
     clear(
         this.about, fact("Id", h("code", {}, job.id), " ", copyButton(job.id, "the job's id")),
         fact("Scene", [job.scene].flat().join(", ")), fact("Options", options || "default"),
+        job.labels?.length > 0 &&
+            fact(
+                "Labels",
+                job.labels.flatMap(
+                    (label) =>
+                        [h("a", {href: `#/?${new URLSearchParams({q: label})}`}, label), " "])),
         fact("Priority", String(job.priority)),
         fact("Attempts", `${job.attempts} of ${job.max_attempts}`),
         fact("Created", ...when(job.created_at)), fact("Started", ...when(job.started_at)),

@@ -1,5 +1,6 @@
-// The list of all jobs, newest first, with a filter by state. The list is refreshed every two
-// seconds while a job on the page has not ended, and every eight seconds otherwise.
+// The list of all jobs with a search and a filter by state: running jobs first, then all others,
+// newest first. The list is refreshed every two seconds while a job on the page has not ended, and
+// every eight seconds otherwise.
 
 import {getJson, poll} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
@@ -8,6 +9,7 @@ import {
   durationText,
   gridText,
   hasEnded,
+  labelsText,
   sceneText,
   shortCount,
   sizeText,
@@ -16,7 +18,9 @@ import {
   titleText,
   unitText
 } from "../lib/format.js";
-import {meter, problemBox, stateBadge, updateJobMeter} from "../views/parts.js";
+import {jobProgress, updateJobMeter} from "../lib/job_progress.js";
+import {BulkActions} from "../views/bulk_actions.js";
+import {meter, problemBox, stateBadge} from "../views/parts.js";
 
 const kStates = ["running", "queued", "suspended", "failed", "canceled", "succeeded"];
 const kPageSize = 50;
@@ -25,7 +29,7 @@ const kIdleMs = 8000;
 
 export function jobsPage(_, query, signal) {
   const state = kStates.includes(query.get("state")) ? query.get("state") : null;
-  const cursor = query.get("cursor");
+  const cursor = query.get("cursor"), words = query.get("q") ?? "";
   const filters = h("div", {class: "filters"});
   const error = h("div", {role: "alert"});
   const list = h("ul", {class: "jobs"});
@@ -34,20 +38,30 @@ export function jobsPage(_, query, signal) {
   const rows = new Map();  // job id -> row
   let seen = false;
 
-  const update = async () => {
+  const listOf = (states, from) => {
     const path = new URLSearchParams({limit: kPageSize});
-    if (state) path.set("state", state === "running" ? "running,canceling" : state);
-    if (cursor) path.set("cursor", cursor);
-    const {jobs, counts, next_cursor} = await getJson(`/api/v1/jobs?${path}`, signal);
+    if (states) path.set("state", states === "running" ? "running,canceling" : states);
+    if (from) path.set("cursor", from);
+    if (words) path.set("q", words);
+    return getJson(`/api/v1/jobs?${path}`, signal);
+  };
+  const update = async () => {
+    const first = state || cursor ? [] : (await listOf("running", null)).jobs;
+    const {jobs: page, counts, next_cursor} = await listOf(state, cursor);
+    const isFirst = new Set(first.map((job) => job.id));
+    const jobs = [...first, ...page.filter((job) => !isFirst.has(job.id))];
     clear(error);
-    showFilters(filters, counts, state);
-    showRows(list, rows, jobs);
+    showFilters(filters, counts, state, words);
+    showRows(list, rows, jobs, bulk);
+    bulk.update(jobs);
     empty.hidden = jobs.length > 0;
-    if (!seen || !empty.hidden) clear(empty, emptyText(state, cursor));
+    if (!seen || !empty.hidden) clear(empty, emptyText(state, cursor, words));
     seen = true;
-    showPaging(older, state, cursor, next_cursor);
+    showPaging(older, {state, q: words}, cursor, next_cursor);
     return jobs.every((job) => hasEnded(job.state)) ? kIdleMs : kBusyMs;
   };
+  const bulk =
+      new BulkActions(() => update().catch((problem) => clear(error, problemBox(problem))));
   poll(update, (problem) => clear(error, problemBox(problem)), signal);
 
   return {
@@ -56,17 +70,42 @@ export function jobsPage(_, query, signal) {
         h("div", {class: "stack"},
           h("div", {class: "page-head"}, h("h1", {}, "Jobs"),
             h("a", {class: "button primary", href: "#/new"}, "New job")),
-          filters, error, list, empty, older)
+          h("div", {class: "find"}, filters, searchForm(state, words)), error, bulk.element, list,
+          empty, older)
   };
 }
 
-function emptyText(state, cursor) {
+// Returns the address of the list for these parameters, of which empty ones are left out.
+function addressOf(parameters) {
+  const given = Object.entries(parameters).filter(([, value]) => value);
+  return `#/${given.length ? "?" : ""}${new URLSearchParams(given)}`;
+}
+
+function searchForm(state, words) {
+  const input = h("input", {
+    type: "search",
+    value: words,
+    maxlength: "100",
+    placeholder: "Name, scene, label or id",
+    "aria-label": "Find jobs by name, scene, label or id"
+  });
+  const form =
+      h("form", {class: "search", role: "search"}, input, h("button", {class: "small"}, "Find"));
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    location.hash = addressOf({state, q: input.value.trim()}).slice(1);
+  });
+  return form;
+}
+
+function emptyText(state, cursor, words) {
   if (cursor) return "No older jobs.";
+  if (words) return `No ${state ? `${state} ` : ""}jobs match "${words}".`;
   if (state) return `No ${state} jobs.`;
   return h("span", {}, "No jobs yet. ", h("a", {href: "#/new"}, "Submit the first one."));
 }
 
-function showFilters(element, counts, chosen) {
+function showFilters(element, counts, chosen, q) {
   const total = Object.values(counts).reduce((sum, n) => sum + n, 0);
   const countOf = (state) =>
       (counts[state] || 0) + (state === "running" ? counts.canceling || 0 : 0);
@@ -76,18 +115,15 @@ function showFilters(element, counts, chosen) {
         h("nav", {"aria-label": "Jobs by state"},
           entries.map(
               ([state, name]) =>
-                  h("a", {
-                    href: state ? `#/?state=${state}` : "#/",
-                    "aria-current": state === chosen ? "true" : null
-                  },
+                  h("a",
+                    {href: addressOf({state, q}), "aria-current": state === chosen ? "true" : null},
                     name, h("span", {class: "count"})))));
   }
   element.querySelectorAll(".count").forEach((count, i) => setText(count, String(entries[i][2])));
 }
 
-function showPaging(element, state, cursor, next_cursor) {
-  const to = (next) =>
-      `#/?${new URLSearchParams({...(state && {state}), ...(next && {cursor: next})})}`;
+function showPaging(element, parameters, cursor, next_cursor) {
+  const to = (next) => addressOf({...parameters, cursor: next});
   clear(
       element, cursor && h("a", {class: "button", href: to(null)}, "Newest"),
       next_cursor && h("a", {class: "button", href: to(next_cursor)}, "Older jobs"));
@@ -95,7 +131,7 @@ function showPaging(element, state, cursor, next_cursor) {
 
 // Shows `jobs` as rows of the element `list`. Keeps the rows of jobs that are already in the list,
 // to preserve focus and selection.
-function showRows(list, rows, jobs) {
+function showRows(list, rows, jobs, bulk) {
   const ids = new Set(jobs.map((job) => job.id));
   for (const [id, row] of rows) {
     if (ids.has(id)) continue;
@@ -103,24 +139,26 @@ function showRows(list, rows, jobs) {
     rows.delete(id);
   }
   jobs.forEach((job, i) => {
-    if (!rows.has(job.id)) rows.set(job.id, jobRow(job));
+    if (!rows.has(job.id)) rows.set(job.id, jobRow(job, bulk));
     const row = rows.get(job.id);
     row.update(job);
     if (list.children[i] !== row.element) list.insertBefore(row.element, list.children[i] || null);
   });
 }
 
-function jobRow(job) {
+function jobRow(job, bulk) {
   const badge = h("span", {class: "badge-place"});
   const bar = meter(`progress of ${titleText(job)}`);
   const activity = h("span", {class: "does"});
   const made = h("time", {class: "made"});
   const element =
-      h("li", {},
+      h("li", {}, h("label", {class: "select"}, bulk.checkbox(job, titleText(job))),
         h("a", {class: "job-row", href: `#/jobs/${job.id}`}, badge,
           h("div", {class: "what"}, h("strong", {}, titleText(job)),
             h("span", {class: "about"},
-              `${job.name ? `${sceneText(job)} · ` : ""}${gridText(job.resolution)}`)),
+              [job.name && sceneText(job), gridText(job.resolution), labelsText(job)]
+                  .filter(Boolean)
+                  .join(" · "))),
           h("div", {class: "how-far"}, bar.element, activity), made));
   let state = null;
   const update = (now) => {
@@ -155,7 +193,8 @@ function activityText(job) {
       if (!p) return "";
       const far =
           p.total ? `${shortCount(p.done)} of ${unitText(shortCount(p.total), p.unit)}` : "";
-      const left = job.state === "running" && p.eta_s > 0 ? `${durationText(p.eta_s)} left` : "";
+      const {leftS} = jobProgress(job);
+      const left = leftS > 0 ? `about ${durationText(leftS)} left` : "";
       return [p.stage, far, left].filter(Boolean).join(" · ");
     }
   }

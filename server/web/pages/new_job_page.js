@@ -28,6 +28,7 @@ class NewJob {
         }
       }
     });
+    this.labels = h("input", {autocomplete: "off", on: {change: () => this.changed()}});
     this.error = h("div", {role: "alert"});
     // The idempotency key changes only with the form, so that a double click creates only one job.
     this.key = randomKey();
@@ -39,7 +40,8 @@ class NewJob {
             h("div", {class: "stack"}, this.scene.element,
               h("section", {class: "card stack", "aria-labelledby": "grid-title"},
                 h("h2", {id: "grid-title"}, "Grid"), this.options.resolutionField,
-                field("Name of the job", this.name, "Optional.")),
+                field("Name of the job", this.name, "Optional."),
+                field("Labels", this.labels, "Optional, separated by commas.")),
               this.options.element),
             h("div", {class: "stack sticky"}, this.estimate.element, this.error,
               h("div", {class: "buttons"}, this.submit))));
@@ -56,6 +58,7 @@ class NewJob {
           like ? await getJson(`/api/v1/jobs/${encodeURIComponent(like)}`, this.signal) : null;
       await this.scene.load(model ? [model.scene].flat() : null);
       if (model) this.options.set(model);
+      if (model?.labels) this.labels.value = model.labels.join(", ");
       this.changed();
     } catch (problem) {
       if (this.signal.aborted) return;
@@ -69,7 +72,8 @@ class NewJob {
     const scene = this.scene.value();
     if (!scene) return null;
     const name = this.name.value.trim();
-    return {scene, ...(name && {name}), ...this.options.values()};
+    const labels = this.labels.value.split(",").map((label) => label.trim()).filter(Boolean);
+    return {scene, ...(name && {name}), ...(labels.length && {labels}), ...this.options.values()};
   }
 
   changed() {

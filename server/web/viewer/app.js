@@ -15,8 +15,8 @@ import {Controls} from "./controls.js";
 import {framed} from "./framing.js";
 import {markKeyUse} from "./key_use.js";
 import {keysHelp, listenToKeys} from "./keys.js";
-import {Markers} from "./markers.js";
 import {Motion} from "./motion.js";
+import {Markers} from "./overlay/markers.js";
 import {Panel} from "./panel.js";
 import {length, subtract} from "./vector.js";
 

@@ -1,7 +1,7 @@
 // Small elements used by several pages.
 
 import {h, setText} from "../lib/dom.js";
-import {doneFraction, stateText} from "../lib/format.js";
+import {stateText} from "../lib/format.js";
 
 export function stateBadge(state) {
   return h("span", {class: `state ${state}`}, stateText(state));
@@ -35,14 +35,6 @@ export function meter(label) {
     else element.setAttribute("aria-valuenow", String(Math.floor(100 * fraction)));
   };
   return {element, update};
-}
-
-// Shows the progress of a job's current stage. The bar is full after the job has succeeded.
-export function updateJobMeter(bar, job) {
-  const fraction = job.state === "succeeded" ? 1 : doneFraction(job.progress);
-  const idle = ["queued", "suspended", "canceled", "failed"].includes(job.state);
-  bar.update(idle && fraction === null ? 0 : fraction);
-  bar.element.dataset.state = job.state;
 }
 
 // Returns a button that copies `text` to the clipboard.

@@ -1,17 +1,10 @@
-// The current stage of a job, and the numbers of its current attempt.
+// The progress of a job over all stages, its current stage, and the numbers of its attempt.
 
 import {h, setText} from "../lib/dom.js";
-import {
-  countText,
-  doneFraction,
-  durationText,
-  hasEnded,
-  shortCount,
-  sizeText,
-  unitText
-} from "../lib/format.js";
+import {countText, durationText, hasEnded, shortCount, sizeText, unitText} from "../lib/format.js";
+import {jobProgress, updateJobMeter} from "../lib/job_progress.js";
 
-import {meter, updateJobMeter} from "./parts.js";
+import {meter} from "./parts.js";
 
 const kFigures = [
   ["elapsed", "Elapsed", (p) => durationText(p.elapsed_s)],
@@ -26,7 +19,7 @@ export class ProgressView {
   constructor() {
     this.stage = h("strong", {class: "stage-now"});
     this.percent = h("span", {class: "percent"});
-    this.bar = meter("progress of the current stage");
+    this.bar = meter("progress of the job");
     this.detail = h("p", {class: "detail"});
     this.values = {};
     const figures = kFigures.map(
@@ -41,16 +34,21 @@ export class ProgressView {
 
   show(job) {
     const p = job.progress;
-    this.element.hidden = job.state === "succeeded";
+    this.element.hidden = job.state === "succeeded" || (hasEnded(job.state) && !p);
     updateJobMeter(this.bar, job);
     setText(this.stage, headline(job));
-    const fraction = doneFraction(p);
-    setText(this.percent, fraction === null || job.state === "queued" ? "" : percentText(fraction));
+    setText(this.percent, job.state === "queued" ? "" : wholeText(jobProgress(job)));
     setText(this.detail, detailText(job));
     this.figures.hidden = !p;
     if (p)
       for (const [key, , text] of kFigures) setText(this.values[key], text(p));
   }
+}
+
+// Returns the text about the job as a whole: "42 %, about 3 m 20 s left".
+function wholeText({fraction, leftS}) {
+  if (fraction === null) return "";
+  return percentText(fraction) + (leftS > 0 ? `, about ${durationText(leftS)} left` : "");
 }
 
 function percentText(fraction) {

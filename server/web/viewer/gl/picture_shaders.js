@@ -418,8 +418,7 @@ void main() {
     }
   }
   float wire = 0.7 * wire_in(g);
-  if (wire > 0.0)
-    color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, wire), max(color.a, wire));
+  color = vec4(mix(color.rgb, vec3(0.05, 0.25, 0.9) / u_range, wire), max(color.a, wire));
   o_color = u_share < 1.0 ? mix(texelFetch(u_before, pixel, 0), color, u_share) : color;
 }`;
 

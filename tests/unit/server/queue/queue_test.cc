@@ -196,6 +196,29 @@ TEST_F(Queue, ListsPageByPage) {
   EXPECT_EQ(queue_->counts().at(JobState::kQueued), 4u);
 }
 
+// A damaged request neither matches nor makes a search fail.
+TEST_F(Queue, SearchesWordsAndLabels) {
+  const std::string id = post().id, damaged = post().id;
+  queue_->change(id, [](Job& j) {
+    j.name = "Bridge";
+    j.request = R"({"scene":["Arch.glb"],"resolution":64,"options":{},"labels":["x y"]})";
+  });
+  queue_->change(damaged, [](Job& j) { j.request = "{"; });
+  const auto count = [&](const std::string& words, const std::string& label) {
+    JobFilter filter;
+    filter.words = words;
+    filter.label = label;
+    return queue_->list(filter).size();
+  };
+  EXPECT_EQ(count("", ""), 2u);
+  for (const std::string& words :
+       {std::string("bridge"), std::string("arch"), std::string("X Y"), id})
+    EXPECT_EQ(count(words, ""), 1u) << words;
+  EXPECT_EQ(count("options", ""), 0u);
+  EXPECT_EQ(count("", "x y"), 1u);
+  EXPECT_EQ(count("", "x"), 0u);
+}
+
 TEST_F(Queue, KnowsWhichScenesAreNeeded) {
   const std::string id = post().id;
   EXPECT_TRUE(queue_->uses_scene("a.glb"));

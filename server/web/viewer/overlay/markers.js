@@ -1,10 +1,10 @@
 // Elements over the picture: marks at the picked voxel and at the first point of a measurement, the
 // measured line with its length, and the card at the picked voxel.
 
-import {h, setText, svg} from "../lib/dom.js";
+import {h, setText, svg} from "../../lib/dom.js";
+import {Projection} from "../projection.js";
 
 import {PickCard} from "./pick_card.js";
-import {Projection} from "./projection.js";
 
 export class Markers {
   // `picks` is the PickView whose picks are shown.

@@ -1,8 +1,8 @@
 // The card next to the picked voxel: its place, and the length of a measurement. Phones show it
 // above the closed panel.
 
-import {clear, h} from "../lib/dom.js";
-import {countText} from "../lib/format.js";
+import {clear, h} from "../../lib/dom.js";
+import {countText} from "../../lib/format.js";
 
 const kGapPx = 14;    // between the voxel and the card
 const kMarginPx = 8;  // between the card and the edge of the picture
@@ -24,10 +24,10 @@ export class PickCard {
     if (!at) return;
     if (this.shown[0] !== pick || this.shown[1] !== start) this.fill(pick, start);
     const {offsetWidth, offsetHeight} = element;
-    const [x, isBeside] = besides(at[0], offsetWidth, width, from !== null && from[0] > at[0]);
+    const [x, isNextTo] = sideOf(at[0], offsetWidth, width, from !== null && from[0] > at[0]);
     // A card that is too wide for both sides is above or below the voxel.
     const above = at[1] - kGapPx - offsetHeight, isFree = !from || from[1] >= at[1];
-    const y = isBeside               ? at[1] - offsetHeight / 2 :
+    const y = isNextTo               ? at[1] - offsetHeight / 2 :
         isFree && above >= kMarginPx ? above :
                                        at[1] + kGapPx;
     const lowest = Math.max(kMarginPx, height - offsetHeight - kMarginPx);
@@ -78,9 +78,9 @@ export class PickCard {
   }
 }
 
-// Returns where a card of this width is in a picture, and whether it is beside the column `at`: on
-// its right or on its left, or in the middle of the picture if it fits on neither side.
-function besides(at, size, width, prefersLeft) {
+// Returns where a card of this width is in a picture, and whether it is next to the column `at`:
+// on its right or on its left, or in the middle of the picture if it fits on neither side.
+function sideOf(at, size, width, prefersLeft) {
   const right = at + kGapPx, left = at - kGapPx - size;
   const fits = {[right]: right + size + kMarginPx <= width, [left]: left >= kMarginPx};
   for (const x of prefersLeft ? [left, right] : [right, left])
