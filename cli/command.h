@@ -150,6 +150,7 @@ void add_render_command(CommandLine& line);
 void add_extract_command(CommandLine& line);
 void add_combine_command(CommandLine& line);
 void add_edit_command(CommandLine& line);
+void add_reorder_command(CommandLine& line);
 void add_export_command(CommandLine& line);
 void add_view_command(CommandLine& line);
 void add_publish_command(CommandLine& line);

@@ -7,6 +7,7 @@
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "core/format/checksum.h"
+#include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
 #include "query/stats/level_stats.h"
 
@@ -65,6 +66,12 @@ ordered_json level_json(const FileFacts& facts, uint32_t l) {
   return json;
 }
 
+// Returns the order of the nodes: its name, or its number if this program does not know it.
+std::string order_of(const voxdag_reader::File& file) {
+  const std::string name = name_of(NodeOrder{file.node_order()});
+  return name.empty() ? std::to_string(file.node_order()) : name;
+}
+
 ordered_json info_json(const FileFacts& facts) {
   const voxdag_reader::File& file = *facts.file;
   ordered_json levels = ordered_json::array();
@@ -75,6 +82,7 @@ ordered_json info_json(const FileFacts& facts) {
       {"resolution", file.resolution()},
       {"bounds", {{"origin", {origin[0], origin[1], origin[2]}}, {"edge", file.edge()}}},
       {"hash_bits", file.hash_bits()},
+      {"node_order", order_of(file)},
       {"voxels", file.voxels()},
       {"svo_nodes", file.svo_nodes()},
       {"dag_nodes", file.dag_nodes()},
@@ -175,6 +183,8 @@ void print(const FileFacts& facts) {
               count_text(file.dag_nodes()).c_str(), file.hash_bits());
   std::printf("  %s of nodes, %.4g bits per voxel\n", size_text(node_bytes(file)).c_str(),
               bits_per_voxel(file));
+  if (NodeOrder{file.node_order()} != NodeOrder::kByHash)
+    std::printf("  nodes in the order %s\n", order_of(file).c_str());
   if (facts.stats)
     std::printf("  with leaves of 2^3 instead of 4^3 voxels: %s DAG nodes\n",
                 count_text(dag_nodes_2(facts)).c_str());

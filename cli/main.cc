@@ -49,7 +49,7 @@ int run(int argc, char** argv) {
            add_import_command,
 #endif
            add_render_command,      add_extract_command,    add_combine_command,
-           add_edit_command,        add_export_command,
+           add_edit_command,        add_reorder_command,    add_export_command,
 #ifdef VOXDAG_HAS_VIEWER
            add_view_command,        add_publish_command,
 #endif

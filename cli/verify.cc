@@ -1,4 +1,4 @@
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -34,6 +34,7 @@ struct VerifyCommand {
   uint64_t seed = 1;
   std::string memory;
   unsigned threads = default_threads();
+  bool quick = false;
   bool quiet = false;
   bool json = false;
 };
@@ -152,7 +153,8 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.path);
   const auto progress = make_progress_bar(command.quiet);
   MemoryBudget budget(~uint64_t{0});
-  verify_global_file(*file, command.threads, budget, *progress, context.cancel);
+  verify_global_file(*file, command.threads, budget, *progress, context.cancel,
+                     global_layout::kNarrowLevelWords, command.quick);
   std::optional<Sample> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
@@ -184,6 +186,8 @@ void declare(Command& command, VerifyCommand& state) {
       .option("--ignore-extension", state.scene_options.ignored_extensions,
               "required extension of a glTF file to ignore, as in the build; repeatable")
       .one_value_each();
+  command.flag("--quick", state.quick,
+               "in a file in the order first-parent, do not look for equal nodes");
   command.threads_option(state.threads);
   command.quiet_flag(state.quiet);
   command.json_flag(state.json);

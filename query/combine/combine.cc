@@ -20,6 +20,7 @@
 #include "query/combine/pair_levels.h"
 #include "query/dag/locked_outputs.h"
 #include "query/dag/refuse_attributes.h"
+#include "query/dag/refuse_order.h"
 #include "query/dag/temporary_work.h"
 
 namespace voxdag::query {
@@ -51,6 +52,8 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
                     std::to_string(a.hash_bits()) + "; " + b.path() + " has " +
                     std::to_string(b.hash_bits()));
   refuse_attributes(b, kNoAttributes);
+  refuse_other_order(a);
+  if (!is_moved) refuse_other_order(b);  // moving a file sorts its nodes
 }
 
 // The folder of the temporary files of one combine() or cut(), and the memory for its data.
@@ -264,6 +267,7 @@ CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b
 CombineReport cut(const voxdag_reader::File& a, const Shape& shape, const CombineSpec& spec,
                   FileSystem& files, Progress& progress, const CancelToken& cancel) {
   refuse_attributes(a, kNoAttributes);
+  refuse_other_order(a);
   LockedOutputs outputs(files, {{spec.output}, {a.path()}, spec.replace});
   const WatchedFile watched(a);
   const auto run = [&] {

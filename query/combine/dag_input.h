@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -33,6 +34,19 @@ class DagInput {
   uint64_t brick(uint64_t offset) {
     expect_intact(file_.brick_level(), offset);
     return file_.brick(offset);
+  }
+  // Returns words [first, first + count) of a level, which must exist.
+  std::span<const uint32_t> words(uint32_t level, uint64_t first, uint64_t count) {
+    const voxdag_reader::Level& from = file_.level(level);
+    bytes(from.file_offset + sizeof(uint32_t) * first, sizeof(uint32_t) * count);
+    return {from.words + first, count};
+  }
+  // Returns bytes of the file, which must be between its header page and its checksum table.
+  std::span<const std::byte> bytes(uint64_t offset, uint64_t count) {
+    const unsigned char* const begin = file_.data() + offset;
+    blocks_.expect_intact(begin, count);
+    touch(count);
+    return std::as_bytes(std::span(begin, count));
   }
   [[noreturn]] void corrupt(uint32_t level, uint64_t offset, const char* what) const;
 
@@ -92,6 +106,8 @@ class LevelCursor {
   uint64_t brick() const {
     return words_.words[offset_] | static_cast<uint64_t>(words_.words[offset_ + 1]) << 32;
   }
+  // Returns the words of the current node or brick.
+  std::span<const uint32_t> words() const { return {words_.words + offset_, size_}; }
   void next() {
     offset_ += size_;
     ++count_;

@@ -86,54 +86,6 @@ class KeptCursor {
   Row row_;
 };
 
-// Appends rows to a level of the new file.
-class RowWriter {
- public:
-  RowWriter(GlobalFileWriter& out, bool wide, MemoryBudget& budget)
-      : out_(out), wide_(wide), words_(budget, kBufferWords, "words of a level") {}
-
-  uint64_t nodes() const { return nodes_; }
-  uint64_t words() const { return written_ + count_; }
-  // Appends the row, and returns its word offset in the new level.
-  uint64_t add(const Row& row) {
-    if (count_ + kMaxRowWords > kBufferWords) flush();
-    const uint64_t position = words();
-    ++nodes_;
-    if (row.mask == 0) {
-      put_wide(row.children[0]);
-      return position;
-    }
-    words_[count_++] = row.mask;
-    for (uint32_t i = 0; i < row.count; ++i)
-      if (wide_)
-        put_wide(row.children[i]);
-      else
-        words_[count_++] = static_cast<uint32_t>(row.children[i]);
-    return position;
-  }
-  void flush() {
-    out_.checksum_words({words_.data(), count_});
-    out_.write_words(written_, {words_.data(), count_});
-    written_ += count_;
-    count_ = 0;
-  }
-
- private:
-  static constexpr uint64_t kBufferWords = uint64_t{1} << 16;
-  static constexpr uint64_t kMaxRowWords = 17;
-  void put_wide(uint64_t number) {
-    words_[count_++] = static_cast<uint32_t>(number);
-    words_[count_++] = static_cast<uint32_t>(number >> 32);
-  }
-
-  GlobalFileWriter& out_;
-  const bool wide_;
-  PageBuffer<uint32_t> words_;
-  uint64_t count_ = 0;    // words in the buffer
-  uint64_t written_ = 0;  // words in the file
-  uint64_t nodes_ = 0;
-};
-
 // The kept nodes of a level of an input file, one of the sources of a new level. `placed` receives
 // their offsets in the new file. `uses` has the places (result_rows.h) whose result is a kept node.
 // `parents` receives the results of these places.

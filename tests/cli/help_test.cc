@@ -12,7 +12,7 @@ using Help = CommandLine;
 constexpr const char* kCommands[] = {
     "build",  "plan",     "status", "info",    "verify", "diff",    "generate",
     "render", "extract",  "submit", "jobs",    "watch",  "cancel",  "suspend",
-    "resume", "download", "view",   "combine", "edit",   "publish",
+    "resume", "download", "view",   "combine", "edit",   "publish", "reorder",
 #ifdef VOXDAG_HAS_ASSIMP
     "import",
 #endif

@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
-#include "core/format/global/verify.h"
 #include "core/format/global/voxdag_reader.h"
+#include "core/format/verify/verify.h"
 #include "scene/generate/generate.h"
 #include "scheduler/run_build.h"
 #include "tests/support/faulty_files.h"

@@ -19,7 +19,6 @@ inline constexpr uint32_t kVersion = 1;
 inline constexpr uint32_t kVersionWithFeatures = 2;
 inline constexpr uint64_t kWideLevels = 1;  // feature bits
 inline constexpr uint64_t kAttributes = 2;
-inline constexpr uint32_t kNodeOrderByHash = 1;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
 inline constexpr uint64_t kMaxLevelWords = uint64_t{1} << 40;
@@ -76,3 +75,21 @@ inline constexpr uint64_t round_up_to_page(uint64_t bytes) {
 }
 
 }  // namespace voxdag::global_layout
+
+namespace voxdag {
+
+// The order of the nodes in each level. The numbers are values of the header.
+enum class NodeOrder : uint32_t { kByHash = 1, kByFirstParent = 2 };
+
+// Returns the name of an order as users write it; "" for an order that is not known.
+constexpr const char* name_of(NodeOrder order) {
+  switch (order) {
+    case NodeOrder::kByHash:
+      return "hash";
+    case NodeOrder::kByFirstParent:
+      return "first-parent";
+  }
+  return "";
+}
+
+}  // namespace voxdag

@@ -10,6 +10,7 @@
 #include "core/dag/brick.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
+#include "core/format/global/block_checksums.h"
 #include "core/format/global/global_layout.h"
 #include "core/io/overwrite.h"
 #include "core/io/temporary_paths.h"
@@ -51,44 +52,6 @@ void read_through(const ReadableFile& file, uint64_t begin, uint64_t end, const 
   }
 }
 
-// Computes the checksums of the checksum blocks (global_layout.h). The bytes of the file are added
-// in order.
-class BlockChecksums {
- public:
-  BlockChecksums() = default;
-  // Continues after complete blocks, whose checksums are `whole_blocks`.
-  explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
-      : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
-
-  void add(std::span<const std::byte> bytes);
-  // Returns the checksums of all blocks. The last checksum covers the bytes of its block so far.
-  std::vector<uint64_t> values() const;
-
- private:
-  std::vector<uint64_t> checksums_;  // checksums of complete blocks
-  Checksum64 block_;                 // checksum of the incomplete block
-  size_t filled_ = 0;                // bytes in the incomplete block so far
-};
-
-void BlockChecksums::add(std::span<const std::byte> bytes) {
-  while (!bytes.empty()) {
-    const auto part = bytes.first(std::min<size_t>(bytes.size(), kChecksumBlockBytes - filled_));
-    block_.add(part);
-    filled_ += part.size();
-    bytes = bytes.subspan(part.size());
-    if (filled_ < kChecksumBlockBytes) return;
-    checksums_.push_back(block_.value());
-    block_.reset();
-    filled_ = 0;
-  }
-}
-
-std::vector<uint64_t> BlockChecksums::values() const {
-  std::vector<uint64_t> all = checksums_;
-  if (filled_ > 0) all.push_back(block_.value());
-  return all;
-}
-
 uint64_t bytes_of(const GlobalLevel& level) { return sizeof(uint32_t) * level.words; }
 
 // A written attribute section.
@@ -115,6 +78,8 @@ struct GlobalFileWriter::State {
   bool level_open = false;
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
+  NodeOrder node_order = NodeOrder::kByHash;
+  std::optional<PlacedChecksums> placed = {};    // checksums of levels that place_levels() placed
   bool retained = false;                         // the partial file outlives the writer
   std::optional<TemporaryPath> registered = {};  // registers the partial file for removal, until it
                                                  // is retained
@@ -132,6 +97,17 @@ struct GlobalFileWriter::State {
     if (file) return;
     file = files.create(partial_path);
     registered.emplace(partial_path);
+  }
+  // Returns the offset in the file of a level that place_levels() placed.
+  uint64_t offset_of(uint32_t level) const {
+    uint64_t offset = kPageBytes;
+    for (uint32_t l = brick_level(); l > level; --l)
+      offset += round_up_to_page(bytes_of(levels[brick_level() - l]));
+    return offset;
+  }
+  void write_placed(uint64_t offset, std::span<const std::byte> bytes) {
+    file->write_at(offset, bytes);
+    placed->add(offset - kPageBytes, bytes);
   }
   // Pads a level or section that ends at byte `content_end` to complete pages.
   void pad(uint64_t content_end);
@@ -253,6 +229,41 @@ void GlobalFileWriter::end_level(const GlobalLevel& level) {
   s.level_open = false;
 }
 
+void GlobalFileWriter::set_node_order(NodeOrder order) { state_->node_order = order; }
+
+void GlobalFileWriter::place_levels(std::span<const GlobalLevel> levels) {
+  State& s = *state_;
+  if (s.file || levels.size() != s.brick_level() + 1)
+    throw Error(ErrorCode::kCorrupt, s.path + ": " + std::to_string(levels.size()) +
+                                         " levels cannot be placed: expected all " +
+                                         std::to_string(s.brick_level() + 1) +
+                                         " levels of a new file");
+  s.create_file();
+  s.levels.assign(levels.begin(), levels.end());
+  s.end = s.offset_of(0) + round_up_to_page(bytes_of(levels.back()));
+  s.placed.emplace(s.end - kPageBytes);
+  const std::byte zeros[kPageBytes] = {};
+  for (uint32_t level = 0; level <= s.brick_level(); ++level) {
+    const uint64_t end = s.offset_of(level) + bytes_of(levels[s.brick_level() - level]);
+    s.write_placed(end, std::span(zeros).first(round_up_to_page(end) - end));
+  }
+}
+
+void GlobalFileWriter::write_placed(uint32_t level, uint64_t first,
+                                    std::span<const uint32_t> words) {
+  State& s = *state_;
+  s.write_placed(s.offset_of(level) + sizeof(uint32_t) * first, std::as_bytes(words));
+}
+
+void GlobalFileWriter::finish_placed() {
+  State& s = *state_;
+  if (s.placed->missing() > 0)
+    throw Error(ErrorCode::kCorrupt, s.path + ": " + std::to_string(s.placed->missing()) +
+                                         " bytes of the levels were not written: expected none");
+  s.block_checksums = s.placed->finish();
+  s.placed.reset();
+}
+
 void GlobalFileWriter::begin_section() {
   State& s = *state_;
   if (s.level_open || s.section_open || s.levels.empty() || !s.complete() ||
@@ -327,7 +338,7 @@ HeaderPage GlobalFileWriter::State::header(const VoxelCounts& counts,
   header.put(kHeaderBytesAt, static_cast<uint32_t>(kPageBytes));
   header.put(kGridLevelsAt, grid.levels);
   header.put(kHashBitsAt, hash_bits);
-  header.put(kNodeOrderAt, kNodeOrderByHash);
+  header.put(kNodeOrderAt, static_cast<uint32_t>(node_order));
   header.put(kChecksumBlockBytesAt, static_cast<uint32_t>(kChecksumBlockBytes));
   for (size_t axis = 0; axis < 3; ++axis)
     header.put(kOriginAt + axis * sizeof(double), grid.origin[axis]);
@@ -410,7 +421,7 @@ bool is_partial_global_file(const ReadableFile& file) {
 GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned threads,
                                          const CancelToken& cancel) {
   State& s = *state_;
-  if (s.level_open || s.section_open || !s.complete())
+  if (s.level_open || s.placed || s.section_open || !s.complete())
     throw Error(ErrorCode::kCorrupt,
                 s.path +
                     (s.section_open ? ": the attribute section"

@@ -138,8 +138,9 @@ class File {
   uint32_t brick_level() const { return grid_levels_ - 2; }
   // Returns the version of the format: 1, or 2 if the file has wide levels or attributes.
   uint32_t version() const { return version_; }
-  // Returns the number of bits of the node hash, 4 to 64; the hash orders the nodes of a level.
+  // Return the bits of the node hash, 4 to 64, and the order of nodes: 1 by hash, 2 first parent.
   uint32_t hash_bits() const { return hash_bits_; }
+  uint32_t node_order() const { return get<uint32_t>(data() + 24); }
   // Return the numbers of set voxels, of nodes of the octree that the DAG represents, and of nodes
   // of the DAG. Bricks count as nodes.
   uint64_t voxels() const { return voxels_; }
@@ -415,12 +416,11 @@ class File {
     expect(begin == table_offset_,
            "the checksum table begins at byte " + str(begin) + ", expected " + str(table_offset_));
     expect(count == blocks, str(count) + " checksum blocks, expected " + str(blocks));
-    expect(bytes_->size() - table_offset_ == 8 * blocks, "the checksum table has " +
-                                                             str(bytes_->size() - table_offset_) +
-                                                             " bytes, expected " + str(8 * blocks));
-    expect(
-        xxh64(data() + table_offset_, static_cast<size_t>(8 * blocks)) == get<uint64_t>(page + 112),
-        "the checksum table fails its own checksum");
+    const uint64_t bytes = bytes_->size() - table_offset_;
+    expect(bytes == 8 * blocks,
+           "the checksum table has " + str(bytes) + " bytes, expected " + str(8 * blocks));
+    expect(xxh64(data() + table_offset_, static_cast<size_t>(bytes)) == get<uint64_t>(page + 112),
+           "the checksum table fails its own checksum");
   }
 
   const std::string path_;

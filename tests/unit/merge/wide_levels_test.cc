@@ -5,7 +5,7 @@
 
 #include "core/format/global/diff.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "tests/unit/merge/merge_harness.h"
 
 namespace voxdag {

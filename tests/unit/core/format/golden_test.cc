@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "tests/unit/core/format/golden_files.h"
 
 namespace voxdag {

@@ -10,7 +10,7 @@
 
 #include "core/base/progress.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "query/combine/combine.h"
 #include "tests/oracle/dag.h"
 #include "tests/unit/core/format/test_files.h"

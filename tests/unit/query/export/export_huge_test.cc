@@ -29,7 +29,7 @@ void write_hole(const std::string& path, const std::vector<GlobalLevel>& levels)
   put(kHeaderBytesAt, static_cast<uint32_t>(kPageBytes));
   put(kGridLevelsAt, static_cast<uint32_t>(levels.size() + 1));
   put(kHashBitsAt, uint32_t{64});
-  put(kNodeOrderAt, kNodeOrderByHash);
+  put(kNodeOrderAt, static_cast<uint32_t>(NodeOrder::kByHash));
   put(kChecksumBlockBytesAt, static_cast<uint32_t>(kChecksumBlockBytes));
   put(kEdgeAt, 1.0);
   put(kVoxelsAt, uint64_t{1000});

@@ -5,7 +5,7 @@
 #include "core/color/color_of.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "tests/unit/core/format/color/colored_files.h"
 
 namespace voxdag {

@@ -8,7 +8,7 @@
 #include "core/color/normal_code.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "tests/unit/core/format/color/valued_files.h"
 
 namespace voxdag {

@@ -1,4 +1,4 @@
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 
 #include <gmock/gmock.h>
 
@@ -230,7 +230,7 @@ TEST_F(VerifyTest, NonZeroReservedBytesAndPaddingAreCaught) {
 TEST_F(VerifyTest, OtherNodeOrdersAreNotRead) {
   write_global(path_, random_voxels(5, 8));
   ByteString bytes = read_bytes(path_);
-  put(bytes, kNodeOrderAt, uint32_t{2});
+  put(bytes, kNodeOrderAt, uint32_t{3});
   reseal(bytes);
   write_bytes(path_, bytes);
   EXPECT_EQ(error_of([&] { verify(path_); }).code(), ErrorCode::kUnsupportedVersion);

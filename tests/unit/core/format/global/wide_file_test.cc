@@ -8,7 +8,7 @@
 #include "core/format/global/diff.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "tests/unit/core/format/test_files.h"
 
 namespace voxdag {

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "query/verify/color_sample.h"
 #include "scene/formats/formats.h"
 #include "scheduler/plan_build.h"

@@ -7,7 +7,7 @@
 
 #include "core/format/color/attribute_section_writer.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 #include "query/export/export.h"
 #include "scene/generate/generate.h"
 #include "scheduler/plan_build.h"

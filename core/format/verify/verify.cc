@@ -1,4 +1,4 @@
-#include "core/format/global/verify.h"
+#include "core/format/verify/verify.h"
 
 #include <algorithm>
 #include <atomic>
@@ -17,7 +17,8 @@
 #include "core/format/global/global_layout.h"
 #include "core/format/global/node_index.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify_colors.h"
+#include "core/format/verify/verify_colors.h"
+#include "core/format/verify/verify_order.h"
 
 namespace voxdag {
 
@@ -27,24 +28,17 @@ namespace {
 
 constexpr uint64_t kBlocksPerItem = 64;  // 4 MiB
 
-// True if `a` is before `b` in the total order of nodes whose hashes are equal.
-bool precedes(const voxdag_reader::Node& a, const voxdag_reader::Node& b) {
-  if (a.child_mask != b.child_mask) return a.child_mask < b.child_mask;
-  for (int c = 0; c < kPopcount8[a.child_mask]; ++c)
-    if (a.child(c) != b.child(c)) return a.child(c) < b.child(c);
-  return false;
-}
-
 class Verifier {
  public:
   Verifier(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-           Progress& progress, const CancelToken& cancel, uint64_t narrow_words)
+           Progress& progress, const CancelToken& cancel, uint64_t narrow_words, bool is_quick)
       : file_(file),
         threads_(threads),
         budget_(budget),
         progress_(progress),
         cancel_(cancel),
         narrow_words_(narrow_words),
+        is_quick_(is_quick),
         indexes_(file.brick_level() + 1) {}
 
   void run() {
@@ -92,10 +86,10 @@ class Verifier {
     if (level == file_.brick_level()) return Pointers::kNone;
     return file_.level(level + 1).pointer_bits == 64 ? Pointers::kWide : Pointers::kNarrow;
   }
+  bool is_by_hash() const { return NodeOrder{file_.node_order()} == NodeOrder::kByHash; }
   // Returns the node that begins at word `at`.
   voxdag_reader::Node node(uint32_t level, uint64_t at) const {
-    const uint32_t* const words = file_.level(level).words + at;
-    return {*words, words + 1, pointers(level) == Pointers::kWide};
+    return verified_node(file_, level, at);
   }
 
   const voxdag_reader::File& file_;
@@ -104,6 +98,7 @@ class Verifier {
   Progress& progress_;
   const CancelToken& cancel_;
   const uint64_t narrow_words_;
+  const bool is_quick_;
   std::vector<NodeIndex> indexes_;  // indexes of the levels checked so far
   PageBuffer<uint64_t> hashes_;     // truncated hashes of the nodes of the level checked last
 };
@@ -118,11 +113,10 @@ void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what
 // The reader has checked the fields that it uses. This function checks all other fields, which must
 // have fixed values.
 void Verifier::check_header() const {
-  uint32_t node_order;
-  std::memcpy(&node_order, file_.data() + kNodeOrderAt, sizeof(node_order));
-  if (node_order != kNodeOrderByHash)
-    throw Error(ErrorCode::kUnsupportedVersion,
-                file_.path() + ": node order " + std::to_string(node_order) + ", expected 1");
+  if (*name_of(NodeOrder{file_.node_order()}) == 0)
+    throw Error(
+        ErrorCode::kUnsupportedVersion,
+        file_.path() + ": node order " + std::to_string(file_.node_order()) + ", expected 1 or 2");
   for (size_t level = 0; level < kMaxLevels; ++level) {
     const size_t entry = kLevelsAt + level * kLevelEntryBytes;
     const bool there = level <= file_.brick_level();
@@ -274,10 +268,9 @@ void Verifier::check_span(uint32_t level, uint64_t span, PageBuffer<uint64_t>& h
   const auto check_order = [&](uint64_t at, uint64_t hash) {
     const auto in_order = [&] {
       if (hash != previous_hash) return previous_hash < hash;
-      return bricks ? file_.brick(previous) < file_.brick(at)
-                    : precedes(node(level, previous), node(level, at));
+      return is_node_less(file_, level, previous, at);
     };
-    if (previous != NodeIndex::kNone && !in_order())
+    if (is_by_hash() && previous != NodeIndex::kNone && !in_order())
       broken(where(level, at), bricks
                                    ? "the brick does not follow the one before it by hash and mask"
                                    : "the node does not follow the one before it in the total "
@@ -309,6 +302,11 @@ void Verifier::check_level(uint32_t level) {
   PageBuffer<uint64_t> hashes(budget_, nodes.node_count, "hashes of a level");
   parallel_for(threads_, indexes_[level].span_count(),
                [&](unsigned, size_t span) { check_span(level, span, hashes); });
+  if (!is_by_hash()) {
+    if (level < file_.brick_level()) expect_first_parents(file_, level, indexes_[level], cancel_);
+    if (!is_quick_)
+      expect_unique({file_, level, indexes_[level], hashes}, threads_, budget_, cancel_);
+  }
   hashes_ = std::move(hashes);
 }
 
@@ -364,8 +362,9 @@ void Verifier::check_counts() const {
 }  // namespace
 
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-                        Progress& progress, const CancelToken& cancel, uint64_t narrow_words) {
-  Verifier(file, threads, budget, progress, cancel, narrow_words).run();
+                        Progress& progress, const CancelToken& cancel, uint64_t narrow_words,
+                        bool is_quick) {
+  Verifier(file, threads, budget, progress, cancel, narrow_words, is_quick).run();
 }
 
 }  // namespace voxdag

@@ -1,4 +1,4 @@
-#include "core/format/global/verify_colors.h"
+#include "core/format/verify/verify_colors.h"
 
 #include <algorithm>
 #include <array>

@@ -4,15 +4,16 @@
 //      padding are 0.
 //   2. Every node has a child mask of 1 to 255, and its child offsets point to the beginnings of
 //      nodes of the next level. No brick is empty.
-//   3. The nodes of a level strictly increase in the total order (hash, mask, child indices), so no
-//      two of them are equal. The hashes are computed from the bricks up.
+//   3. The nodes of a level are in the order that the header names, and no two of them are equal.
+//      In the order by hash, they strictly increase in the total order (hash, mask, child indices).
+//      The hashes are computed from the bricks up.
 //   4. There is one root, and every other node has a parent.
 //   5. The numbers of voxels and octree nodes in the header equal the DAG's.
 //   6. Colors and other attributes satisfy the rules in verify_colors.h.
 //
 // Needs 2 bits of memory per word of the file, and 9 bytes per node of two consecutive levels,
-// charged to the budget. All threads work on the same level. The result does not depend on the
-// number of threads.
+// charged to the budget. In the order by first parent, also 64 MiB per thread. All threads work on
+// the same level. The result does not depend on the number of threads.
 #pragma once
 
 #include <cstdint>
@@ -28,9 +29,11 @@ namespace voxdag {
 
 // Checks the file on up to `threads` threads. Throws Error{kCorrupt}; the message names the
 // problem, its place and the expected value. A level must be wide if and only if it has more than
-// `narrow_words` words.
+// `narrow_words` words. If `is_quick` is set, does not compare the nodes of a file in the order by
+// first parent for equal nodes.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,
-                        uint64_t narrow_words = global_layout::kNarrowLevelWords);
+                        uint64_t narrow_words = global_layout::kNarrowLevelWords,
+                        bool is_quick = false);
 
 }  // namespace voxdag

@@ -1,0 +1,34 @@
+// Writes the levels of a global file in a chosen order of the nodes (docs/format.md, "Node order"):
+//
+//   first_parent.h   the order by first parent, from the root down
+//   by_hash.h        the total order by hash, from the bricks up
+#pragma once
+
+#include <cstdint>
+
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "core/format/global/global_layout.h"
+#include "core/format/global/global_writer.h"
+#include "core/format/global/voxdag_reader.h"
+#include "merge/load/scratch_file.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+// The memory for order_levels(), and the folder for data that does not fit in this memory.
+struct OrderSpace {
+  ScratchFolder& folder;
+  MemoryBudget& budget;
+  uint64_t memory_bytes = 0;  // limit of the process's resident memory
+  // Additional limit for the memory of each list and of each level. Tests set a small limit.
+  uint64_t list_bytes = ~uint64_t{0};
+};
+
+// Writes the levels of `file`, whose nodes may be in any known order, to `out`, a new file with the
+// same grid. Throws Error{kUnsupportedVersion} for an order that is not known, Error{kCorrupt} for
+// a damaged file, and the errors of OrderSpace's folder.
+void order_levels(const voxdag_reader::File& file, NodeOrder order, const OrderSpace& space,
+                  GlobalFileWriter& out, Progress& progress, const CancelToken& cancel);
+
+}  // namespace voxdag::query
