@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "core/format/global/voxdag_reader.h"
+#include "query/dag/dag_view.h"
+#include "query/lookup/overlaps.h"
 #include "voxdag/query.h"
 
 using voxdag::query::Position;
@@ -117,6 +119,29 @@ voxdag::query::RayLimits ray_limits_of(const voxdag_ray_limits* limits) {
            " does not know: expected "
            "0 in their bytes");
   return {limits->max_distance, limits->stop_size};
+}
+
+std::array<double, 3> point_of(const double (&from)[3]) { return {from[0], from[1], from[2]}; }
+voxdag::query::OverlapBox shape_of(const voxdag_box& box) {
+  return {point_of(box.low), point_of(box.high)};
+}
+voxdag::query::Capsule shape_of(const voxdag_capsule& capsule) {
+  return {point_of(capsule.from), point_of(capsule.to), capsule.radius};
+}
+
+template <class Shape>
+voxdag_status overlaps_of(const voxdag_file* file, uint32_t grid_levels, const Shape* shapes,
+                          size_t count, uint8_t* overlaps) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) {
+      expect_pointer(shapes, "the array of shapes");
+      expect_pointer(overlaps, "the array of answers");
+    }
+    const voxdag::query::DagView dag(file->dag.file());
+    for (size_t i = 0; i < count; ++i)
+      overlaps[i] = voxdag::query::overlaps(dag, grid_levels, shape_of(shapes[i]));
+  });
 }
 
 // Number of rays or voxels that are converted and queried together. It limits the size of the
@@ -296,6 +321,34 @@ voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
              "not of " +
              std::to_string(capacity));
   });
+}
+
+voxdag_status voxdag_bricks(const voxdag_file* file, uint32_t grid_levels,
+                            const voxdag_region* region, size_t capacity, voxdag_brick* bricks,
+                            size_t* count) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    expect_pointer(count, "the place of the count");
+    if (capacity) expect_pointer(bricks, "the array of bricks");
+    size_t found = 0;
+    file->dag.bricks(selection_of(grid_levels, region), [&](const voxdag::query::Brick& brick) {
+      if (found < capacity)
+        bricks[found] = {{brick.low[0], brick.low[1], brick.low[2]}, brick.mask};
+      ++found;
+    });
+    *count = found;
+  });
+}
+
+voxdag_status voxdag_overlap_boxes(const voxdag_file* file, uint32_t grid_levels,
+                                   const voxdag_box* boxes, size_t count, uint8_t* overlaps) {
+  return overlaps_of(file, grid_levels, boxes, count, overlaps);
+}
+
+voxdag_status voxdag_overlap_capsules(const voxdag_file* file, uint32_t grid_levels,
+                                      const voxdag_capsule* capsules, size_t count,
+                                      uint8_t* overlaps) {
+  return overlaps_of(file, grid_levels, capsules, count, overlaps);
 }
 
 voxdag_status voxdag_nearest(const voxdag_file* file, const int64_t (*voxels)[3], size_t count,

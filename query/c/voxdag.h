@@ -94,6 +94,27 @@ typedef struct voxdag_hit {
   int8_t reserved[5];
 } voxdag_hit;
 
+/* A box, in voxels. */
+typedef struct voxdag_box {
+  double low[3];
+  double high[3];
+} voxdag_box;
+
+/* The points whose distance from a segment is less than `radius`, in voxels. A sphere has the same
+ * two ends. */
+typedef struct voxdag_capsule {
+  double from[3];
+  double to[3];
+  double radius;
+} voxdag_capsule;
+
+/* 4x4x4 cells. The cell low + (x, y, z) is the bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0 of the mask,
+ * where x1 and x0 are the two bits of x. */
+typedef struct voxdag_brick {
+  int64_t low[3];
+  uint64_t mask;
+} voxdag_brick;
+
 /* The version of the library, such as "0.1.0". */
 VOXDAG_API const char* voxdag_version(void);
 
@@ -153,6 +174,22 @@ VOXDAG_API voxdag_status voxdag_dense(const voxdag_file* file, uint32_t grid_lev
 VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_levels,
                                      const voxdag_region* region, size_t capacity,
                                      int64_t (*cells)[3]);
+
+/* Writes the bricks with set cells in a region to `bricks`, in Morton order, at most `capacity` of
+ * them. Masks have only the cells in the region. Sets `count` to the number of all these bricks,
+ * which may be larger than `capacity`; with the capacity 0, only counts. */
+VOXDAG_API voxdag_status voxdag_bricks(const voxdag_file* file, uint32_t grid_levels,
+                                       const voxdag_region* region, size_t capacity,
+                                       voxdag_brick* bricks, size_t* count);
+
+/* Set overlaps[i] to 1 if a set cell overlaps shape i, else to 0. A cell that only touches the
+ * shape does not overlap it. `count` is the number of shapes. */
+VOXDAG_API voxdag_status voxdag_overlap_boxes(const voxdag_file* file, uint32_t grid_levels,
+                                              const voxdag_box* boxes, size_t count,
+                                              uint8_t* overlaps);
+VOXDAG_API voxdag_status voxdag_overlap_capsules(const voxdag_file* file, uint32_t grid_levels,
+                                                 const voxdag_capsule* capsules, size_t count,
+                                                 uint8_t* overlaps);
 
 /* Finds the nearest set voxel for each of `count` voxels, by the distance between the centers, in
  * voxels. If several set voxels are equally near, the result is the first of them in Morton order.

@@ -1,0 +1,137 @@
+#include "query/lookup/overlaps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "core/base/error.h"
+#include "query/lookup/bricks.h"
+
+namespace voxdag::query {
+namespace {
+
+using Point = std::array<double, 3>;
+
+bool touches(const OverlapBox& box, const Point& low, double edge) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (box.low[axis] >= low[axis] + edge || box.high[axis] <= low[axis]) return false;
+  return true;
+}
+
+// The distance from a cube along one axis, with a sign; 0 between its sides.
+double excess(double at, double low, double high) {
+  return at < low ? at - low : at > high ? at - high : 0;
+}
+
+// Finds the point of the segment that is nearest to a cube. The squared distance is a convex
+// function of the position t on the segment, and its derivative is linear between the positions at
+// which the segment crosses the planes of the cube's sides.
+class SegmentDistance {
+ public:
+  SegmentDistance(const Capsule& capsule, const Point& low, double edge)
+      : capsule_(capsule), low_(low), edge_(edge) {}
+
+  double squared() const {
+    const double t = nearest();
+    double sum = 0;
+    for (size_t axis = 0; axis < 3; ++axis) sum += excess_at(axis, t) * excess_at(axis, t);
+    return sum;
+  }
+
+ private:
+  double direction(size_t axis) const { return capsule_.to[axis] - capsule_.from[axis]; }
+  double excess_at(size_t axis, double t) const {
+    return excess(capsule_.from[axis] + t * direction(axis), low_[axis], low_[axis] + edge_);
+  }
+  // Half the derivative of the squared distance.
+  double slope(double t) const {
+    double sum = 0;
+    for (size_t axis = 0; axis < 3; ++axis) sum += direction(axis) * excess_at(axis, t);
+    return sum;
+  }
+  double nearest() const {
+    if (slope(0) >= 0) return 0;
+    if (slope(1) <= 0) return 1;
+    std::array<double, 8> ts = {0, 1, 1, 1, 1, 1, 1, 1};
+    for (size_t axis = 0; axis < 3; ++axis)
+      for (size_t side = 0; side < 2; ++side) {
+        const double plane = low_[axis] + static_cast<double>(side) * edge_;
+        const double t = (plane - capsule_.from[axis]) / direction(axis);
+        if (t > 0 && t < 1) ts[1 + 2 * axis + side] = t;
+      }
+    std::ranges::sort(ts);
+    for (size_t i = 0; i + 1 < ts.size(); ++i) {
+      const double begin = slope(ts[i]), end = slope(ts[i + 1]);
+      if (end < 0) continue;
+      return end == begin ? ts[i] : ts[i] + (ts[i + 1] - ts[i]) * -begin / (end - begin);
+    }
+    return 1;
+  }
+
+  const Capsule& capsule_;
+  const Point low_;
+  const double edge_;
+};
+
+bool touches(const Capsule& capsule, const Point& low, double edge) {
+  return SegmentDistance(capsule, low, edge).squared() < capsule.radius * capsule.radius;
+}
+
+// Searches the cells that overlap a shape.
+template <class Shape>
+class OverlapSearch {
+ public:
+  OverlapSearch(const DagView& dag, uint32_t grid_levels, const Shape& shape)
+      : dag_(dag), grid_levels_(grid_levels), shape_(shape) {}
+
+  bool run() const {
+    return !dag_.empty() &&
+           visit(0, dag_.root(), {0, 0, 0}, static_cast<double>(dag_.resolution()));
+  }
+
+ private:
+  bool visit(uint32_t depth, uint64_t content, const Point& low, double edge) const {
+    if (!touches(shape_, low, edge)) return false;
+    if (depth == grid_levels_) return true;
+    const DagView::Children children = dag_.children(depth, content);
+    const double half = edge / 2;
+    for (int i = 0; i < 8; ++i) {
+      if (!children.has(i)) continue;
+      const Point corner = {low[0] + (i & 4 ? half : 0), low[1] + (i & 2 ? half : 0),
+                            low[2] + (i & 1 ? half : 0)};
+      if (visit(depth + 1, dag_.content(depth, children, i), corner, half)) return true;
+    }
+    return false;
+  }
+
+  const DagView& dag_;
+  const uint32_t grid_levels_;
+  const Shape& shape_;
+};
+
+void expect_finite(const char* shape, const Point& point) {
+  for (const double number : point)
+    if (!std::isfinite(number))
+      throw Error(ErrorCode::kInvalidInput, std::string(shape) + " has the coordinate " +
+                                                std::to_string(number) +
+                                                ": expected finite numbers");
+}
+
+}  // namespace
+
+bool overlaps(const DagView& dag, uint32_t grid_levels, const OverlapBox& box) {
+  check_grid_levels(dag, grid_levels);
+  expect_finite("a box", box.low);
+  expect_finite("a box", box.high);
+  return OverlapSearch<OverlapBox>(dag, grid_levels, box).run();
+}
+
+bool overlaps(const DagView& dag, uint32_t grid_levels, const Capsule& capsule) {
+  check_grid_levels(dag, grid_levels);
+  expect_finite("a capsule", capsule.from);
+  expect_finite("a capsule", capsule.to);
+  expect_finite("a capsule", {capsule.radius, 0, 0});
+  return OverlapSearch<Capsule>(dag, grid_levels, capsule).run();
+}
+
+}  // namespace voxdag::query
