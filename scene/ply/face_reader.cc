@@ -24,14 +24,25 @@ void FaceReader::read(uint64_t first, uint64_t count, uint32_t* corners, Surface
   surfaces.texcoords.clear();
   seek(first);
   for (const uint64_t end = first + count;;) {
-    const auto indices = rows_->indices();
-    for (const uint64_t face_end = std::min(end, this->face_end()); first < face_end; ++first) {
-      for (size_t k = 0; k < 3; ++k) *corners++ = indices[corner_of(first, k)];
+    const uint64_t face_end = std::min(end, this->face_end());
+    corners = copy_corners(first, face_end, corners);
+    for (; first < face_end; ++first)
       if (has_surfaces_) add_surface(first, surfaces);
-    }
     if (first == end) return;
     load();
   }
+}
+
+// Writes the corners of triangles [first, end) of the current face to `out`. Returns the end of the
+// written corners.
+uint32_t* FaceReader::copy_corners(uint64_t first, uint64_t end, uint32_t* out) const {
+  const auto indices = rows_->indices();
+  const auto split = split_;
+  for (; first < end; ++first)
+    for (size_t k = 0; k < 3; ++k)
+      *out++ = indices[polygon::position_of_corner(
+          split, static_cast<size_t>(first - first_triangle_), k)];
+  return out;
 }
 
 void FaceReader::add_surface(uint64_t triangle, Surfaces& out) const {

@@ -51,6 +51,7 @@ class FaceReader {
   void load_at(uint64_t offset);
   uint64_t face_end() const;
   size_t corner_of(uint64_t triangle, size_t k) const;
+  uint32_t* copy_corners(uint64_t first, uint64_t end, uint32_t* out) const;
   void add_surface(uint64_t triangle, Surfaces& out) const;
 
   const PlyFile& ply_;
