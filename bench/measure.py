@@ -130,7 +130,7 @@ def amount(value):
     return f"{value:.4g}"
 
 
-def print_table(heads, rows):
+def table(heads, rows):
     """A Markdown table with aligned columns, the first to the left, numbers to the right."""
     cells = [heads] + [[str(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in cells) for i in range(len(heads))]
@@ -140,7 +140,11 @@ def print_table(heads, rows):
         return "| " + " | ".join(padded) + " |"
 
     rules = ["-" * widths[0]] + ["-" * (w - 1) + ":" for w in widths[1:]]
-    print("\n".join([line(cells[0]), line(rules)] + [line(row) for row in cells[1:]]), flush=True)
+    return "\n".join([line(cells[0]), line(rules)] + [line(row) for row in cells[1:]])
+
+
+def print_table(heads, rows):
+    print(table(heads, rows), flush=True)
 
 
 def add_common_options(parser):

@@ -1,7 +1,8 @@
 // Scenes generated from a seed. They can have any size, and are streamed to a .glb in a few MB of
 // memory. They have the same bytes on every machine, because the generators use only integers,
 // their own random numbers, and + - * / and sqrt of IEEE doubles, compiled without fused
-// multiply-add. docs/generate.md describes the kinds. Tests compare each kind with a stored digest.
+// multiply-add. docs/examples/generate.md describes the kinds. Tests compare each kind with a
+// stored digest.
 #pragma once
 
 #include <cstdint>

@@ -31,6 +31,7 @@ void fields(Visitor& visit, JobLimits& jobs) {
   visit("max_concurrent", jobs.max_concurrent);
   visit(Field("memory").bytes(), jobs.memory_bytes);
   visit("threads", jobs.threads);
+  visit(Field("cache").bytes(), jobs.cache_bytes);
   visit(Field("min_free_disk").bytes(), jobs.min_free_disk_bytes);
   visit("nice", jobs.nice);
   visit("max_attempts", jobs.max_attempts);
@@ -140,6 +141,9 @@ void check_config(const ServerConfig& config) {
          "jobs.memory is " + size_text(config.jobs.memory_bytes) +
              ": expected at least 64MiB for each of the " +
              std::to_string(config.jobs.max_concurrent) + " jobs of jobs.max_concurrent");
+  expect(config.jobs.cache_bytes == 0 || config.cluster.engine == ClusterEngine::kNone,
+         "jobs.cache is " + size_text(config.jobs.cache_bytes) +
+             ": expected no cache with cluster.engine, because builds of a cluster do not use it");
   for (const std::string& root : config.scene_roots)
     expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");
   for (const std::string& origin : config.embed_origins)

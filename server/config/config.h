@@ -16,6 +16,8 @@ struct JobLimits {
   unsigned max_concurrent = 1;
   uint64_t memory_bytes = 0;  // for all running jobs together; 0: half of the machine's memory
   unsigned threads = 0;       // default number per job; 0: all cores
+  // Limit of the folder DATA/cache, through which jobs share subvolumes; 0: no such folder.
+  uint64_t cache_bytes = 0;
   uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // a job starts only if this much space is free
   int nice = 5;                                      // nice value of the jobs' processes
   unsigned max_attempts = 5;

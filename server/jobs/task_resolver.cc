@@ -80,6 +80,10 @@ JobTask TaskResolver::make(const JobRequest& request, JobTask::Kind kind) {
                            ", the limit for a job of this service");
   task.threads = config_.jobs.threads;
   task.min_free_bytes = config_.jobs.min_free_disk_bytes;
+  if (config_.jobs.cache_bytes > 0) {
+    task.cache_folder = resolved_path(config_.data_folder) + "/cache";
+    task.cache_bytes = config_.jobs.cache_bytes;
+  }
   task.cluster = config_.cluster;
   return task;
 }

@@ -59,6 +59,7 @@ ConfinedFiles confined(FileSystem& files, const JobTask& task, const JobFolder& 
     readable.push_back(here + folder.result() + suffix);
     readable.push_back(here + folder.report() + suffix);
   }
+  if (!task.cache_folder.empty()) readable.push_back(task.cache_folder + "/");
   return ConfinedFiles(files, readable);
 }
 
@@ -71,6 +72,10 @@ BuildSpec spec_of(const JobTask& task, const JobFolder& folder) {
   if (spec.run.memory_bytes == 0) spec.run.memory_bytes = task.memory_bytes;
   if (spec.run.threads == 0) spec.run.threads = task.threads;
   spec.run.min_free_bytes = task.min_free_bytes;
+  if (!task.cache_folder.empty()) {
+    spec.run.cache_folder = task.cache_folder;
+    spec.run.cache_bytes = task.cache_bytes;
+  }
   if (task.cluster.engine != ClusterEngine::kNone) {
     spec.run.cluster = task.cluster;
     spec.run.cluster->program_version = VOXDAG_VERSION;

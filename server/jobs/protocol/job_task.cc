@@ -17,6 +17,8 @@ void fields(Visitor& visit, JobTask& task) {
   visit("memory_bytes", task.memory_bytes);
   visit("threads", task.threads);
   visit("min_free_bytes", task.min_free_bytes);
+  visit("cache_folder", task.cache_folder);
+  visit("cache_bytes", task.cache_bytes);
   visit.object("cluster", [&](auto& cluster) {
     cluster("engine", task.cluster.engine);
     cluster("tasks", task.cluster.tasks);

@@ -20,6 +20,8 @@ struct JobTask {
   uint64_t memory_bytes = 0;          // memory limit if the request has none
   unsigned threads = 0;               // number of threads if the request has none
   uint64_t min_free_bytes = 0;        // disk space that the job leaves free
+  std::string cache_folder;           // "": no cache
+  uint64_t cache_bytes = 0;           // limit of the cache folder
   ClusterOptions cluster;             // as in ServerConfig
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);

@@ -86,7 +86,7 @@ TEST(Menger, TrianglesSetTheKnownVoxels) {
   }
 }
 
-// Computes the table of docs/generate.md from the definition and the oracle's DAG.
+// Computes the table of docs/examples/generate.md from the definition and the oracle's DAG.
 TEST(Menger, DagIsAsDocumented) {
   const struct {
     uint32_t level;

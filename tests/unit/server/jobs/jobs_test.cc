@@ -149,6 +149,8 @@ TEST(TaskFile, IsReadAsItWasWritten) {
   task.readable = {"/x/"};
   task.memory_bytes = 123;
   task.threads = 3;
+  task.cache_folder = "/x/cache";
+  task.cache_bytes = 456;
   write_task(system_files(), folder.file("task.json"), task);
   const JobTask back = read_task(system_files(), folder.file("task.json"));
   EXPECT_EQ(back.kind, task.kind);
@@ -157,6 +159,8 @@ TEST(TaskFile, IsReadAsItWasWritten) {
   EXPECT_EQ(back.readable, task.readable);
   EXPECT_EQ(back.memory_bytes, 123u);
   EXPECT_EQ(back.threads, 3u);
+  EXPECT_EQ(back.cache_folder, task.cache_folder);
+  EXPECT_EQ(back.cache_bytes, 456u);
 }
 
 template <class M>
