@@ -100,16 +100,17 @@ typedef struct voxdag_box {
   double high[3];
 } voxdag_box;
 
-/* The points whose distance from a segment is less than `radius`, in voxels. A sphere has the same
- * two ends. */
+/* A capsule: all points whose distance from the segment between `from` and `to` is less than
+ * `radius`, in voxels. If both ends are equal, the capsule is a sphere. */
 typedef struct voxdag_capsule {
   double from[3];
   double to[3];
   double radius;
 } voxdag_capsule;
 
-/* 4x4x4 cells. The cell low + (x, y, z) is the bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0 of the mask,
- * where x1 and x0 are the two bits of x. */
+/* A brick: 4x4x4 cells of a grid, with the low corner `low`. The cell low + (x, y, z) is set if
+ * bit 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0 of `mask` is 1. x1 is the high bit of x (0 to 3) and x0
+ * the low bit, likewise for y and z. */
 typedef struct voxdag_brick {
   int64_t low[3];
   uint64_t mask;
@@ -175,15 +176,16 @@ VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_leve
                                      const voxdag_region* region, size_t capacity,
                                      int64_t (*cells)[3]);
 
-/* Writes the bricks with set cells in a region to `bricks`, in Morton order, at most `capacity` of
- * them. Masks have only the cells in the region. Sets `count` to the number of all these bricks,
- * which may be larger than `capacity`; with the capacity 0, only counts. */
+/* Writes the bricks that have set cells in a region, in Morton order, to the array `bricks` of
+ * length `capacity`. Leaves out the bricks that do not fit. A mask has only those set cells of
+ * its brick that are in the region. Sets *count to the number of all bricks of the region, which
+ * may be larger than `capacity`. To get only this number, use the capacity 0. */
 VOXDAG_API voxdag_status voxdag_bricks(const voxdag_file* file, uint32_t grid_levels,
                                        const voxdag_region* region, size_t capacity,
                                        voxdag_brick* bricks, size_t* count);
 
-/* Set overlaps[i] to 1 if a set cell overlaps shape i, else to 0. A cell that only touches the
- * shape does not overlap it. `count` is the number of shapes. */
+/* For each of `count` shapes: set overlaps[i] to 1 if shape i overlaps a set cell, else to 0. A
+ * shape that only touches a cell does not overlap it. */
 VOXDAG_API voxdag_status voxdag_overlap_boxes(const voxdag_file* file, uint32_t grid_levels,
                                               const voxdag_box* boxes, size_t count,
                                               uint8_t* overlaps);

@@ -53,7 +53,7 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
                     std::to_string(b.hash_bits()));
   refuse_attributes(b, kNoAttributes);
   refuse_other_order(a);
-  if (!is_moved) refuse_other_order(b);  // moving a file sorts its nodes
+  if (!is_moved) refuse_other_order(b);  // a moved file is sorted again
 }
 
 // The folder of the temporary files of one combine() or cut(), and the memory for its data.

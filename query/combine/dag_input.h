@@ -35,13 +35,14 @@ class DagInput {
     expect_intact(file_.brick_level(), offset);
     return file_.brick(offset);
   }
-  // Returns words [first, first + count) of a level, which must exist.
+  // Returns words [first, first + count) of a level. The level must have these words.
   std::span<const uint32_t> words(uint32_t level, uint64_t first, uint64_t count) {
     const voxdag_reader::Level& from = file_.level(level);
     bytes(from.file_offset + sizeof(uint32_t) * first, sizeof(uint32_t) * count);
     return {from.words + first, count};
   }
-  // Returns bytes of the file, which must be between its header page and its checksum table.
+  // Returns `count` bytes of the file from `offset` on. All of them must be between the header page
+  // and the checksum table.
   std::span<const std::byte> bytes(uint64_t offset, uint64_t count) {
     const unsigned char* const begin = file_.data() + offset;
     blocks_.expect_intact(begin, count);

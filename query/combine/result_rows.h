@@ -118,7 +118,7 @@ class RowWriter {
 
   uint64_t nodes() const { return nodes_; }
   uint64_t words() const { return written_ + count_; }
-  // Appends the row, and returns its word offset in the new level.
+  // Appends the row. Returns the word offset in the new level at which it begins.
   uint64_t add(const Row& row) {
     if (count_ + kMaxRowWords > kBufferWords) flush();
     const uint64_t position = words();

@@ -1,4 +1,5 @@
-// Refuses files whose nodes are not in the order by hash, for commands that merge sorted levels.
+// Rejects files whose nodes are not in the order by hash (docs/format.md, "Node order"). Commands
+// that merge the levels of two files need this order.
 #pragma once
 
 #include <string>
@@ -9,8 +10,8 @@
 
 namespace voxdag::query {
 
-// Throws Error{kInvalidInput} unless the nodes are in the order by hash. The message ends with the
-// command that changes the order.
+// Throws Error{kInvalidInput} unless the nodes of the file are in the order by hash. The message
+// ends with the command that reorders the file.
 inline void refuse_other_order(const voxdag_reader::File& file) {
   if (NodeOrder{file.node_order()} != NodeOrder::kByHash)
     throw Error(ErrorCode::kInvalidInput,

@@ -23,8 +23,9 @@ class AttributeCursor {
   const AttributeTraits& traits() const { return traits_; }
   const EncodingTraits& encoding() const { return traits_of(traits_.encoding); }
 
-  // Calls put(number) for each component of the value of a set cell of the selection's grid,
-  // in turned axes. Throws Error{kCorrupt}.
+  // Calls put(number) for each component of the attribute of a cell. `turned_cell` is a set cell of
+  // the selected grid, in turned axes (axis_turn.h). A normal is turned likewise. Throws
+  // Error{kCorrupt} if the cell has no value.
   template <class Put>
   void put(const std::array<int64_t, 3>& turned_cell, const Put& put) {
     const Position cell = job_.original(turned_cell);

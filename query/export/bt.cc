@@ -1,13 +1,14 @@
-// Writes OctoMap's binary octree (Hornung et al. 2013): a text header, then two bytes for each
-// inner node, depth first. Bits 2i and 2i + 1 of these bytes describe child i: 01 (only bit 2i is
-// set) is free, 10 occupied, 11 an inner node, 00 unknown. Child x + 2y + 4z is the child at (x, y,
-// z), where each coordinate is 0 or 1. This code does not use the OctoMap library, because the
-// library would store all nodes in memory.
+// Writes OctoMap's binary octree (Hornung et al. 2013): a text header, and then two bytes for each
+// inner node, depth first. Bits 2i and 2i + 1 of the two bytes are the state of child i, as a
+// number: 0 unknown, 1 free, 2 occupied, 3 an inner node. Child x + 2y + 4z is at (x, y, z), where
+// each coordinate is 0 or 1. This code does not use the OctoMap library, because the library would
+// store all nodes in memory.
 //
-// The octree has 16 levels, and the origin of its coordinates is in its middle. The grid is placed
-// so that the origin of the scene is the octree's origin, up to half a voxel. A cube of the octree
-// then does not coincide with a cube of the grid. So the export reads the cells in blocks of 32^3
-// cells of the octree, and makes the nodes from these cells.
+// The octree has 16 levels. The origin of its coordinates is in its middle. The exporter rounds the
+// position of the grid to cells, so that the origin of the octree is at most half a voxel from the
+// origin of the scene. After this shift, octree cubes are in general not cubes of the grid. So the
+// exporter reads the cells of one octree block after the other, 32^3 cells each, and makes the
+// nodes from these cells.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -30,12 +31,12 @@ constexpr uint32_t kOctoMapLevels = 16;
 constexpr uint64_t kNodeBytes = 2;
 enum BtChild : uint32_t { kUnknown = 0, kFree = 1, kOccupied = 2, kInner = 3 };
 
-// Edge of the blocks whose cells are read together.
+// Edge of the octree blocks whose cells are in memory at the same time, in cells.
 constexpr int64_t kBlockEdge = 32;
 constexpr uint32_t kBlockLevels = 5;
 constexpr int64_t kHalfTree = int64_t{1} << (kOctoMapLevels - 1);
 
-// The place of the grid's low corner in the octree, in cells from the octree's origin.
+// Returns the octree position of the grid's low corner, in cells from the octree's origin.
 Position place_of(const ExportJob& job) {
   Position place{};
   const int64_t edge = int64_t{1} << job.selection.grid_levels;
@@ -50,14 +51,16 @@ Position place_of(const ExportJob& job) {
 // What a cube of the octree contains.
 enum class Content : uint8_t { kNothing, kSomething, kFull };
 
-// The cells of an aligned block of the octree in Morton order: bit 0 of an index is x.
+// The cells of one block of the octree, as bits in Morton order. The lowest bit of an index is the
+// lowest bit of x.
 class BlockCells {
  public:
-  // `place`: the grid's low corner in the octree.
+  // `place` is place_of(job).
   BlockCells(const ExportJob& job, const Position& place) : job_(job), place_(place) {}
 
-  // Reads the selected cells of the block at this low corner. `region` is the selected part of the
-  // block, in cells of the grid. Returns the number of set cells.
+  // Reads the selected cells of the block whose low corner is `corner`, in cells from the octree's
+  // origin. `region` is the selected part of the block, in cells of the grid. Returns the number of
+  // set cells.
   uint64_t read(const Position& corner, const Region& region) {
     cells_.fill(0);
     uint64_t count = 0;
@@ -74,7 +77,8 @@ class BlockCells {
     });
     return count;
   }
-  // Returns the content of the cube of edge^3 cells that begins at this index.
+  // Returns the content of a cube of edge^3 cells in the block. `index` is the index of the first
+  // cell of the cube.
   Content content(uint64_t index, int64_t edge) const {
     const uint64_t count = cells_of_cube(edge);
     if (count < 64) {
@@ -96,16 +100,18 @@ class BlockCells {
   std::array<uint64_t, (size_t{1} << 3 * kBlockLevels) / 64> cells_{};
 };
 
-// Makes the nodes depth first. A full cube of 8 to 256 cells per edge is one occupied leaf. Inside
-// the region, cubes without voxels are free, even inside closed objects: a surface does not show
-// which of its sides is solid (docs/export.md).
+// Makes the nodes depth first. A full cube of 8 to 256 cells per edge becomes one occupied leaf.
+// Cubes without voxels become free if they are in the selected region, even inside closed objects:
+// a surface does not show which of its sides is solid (docs/export.md). Outside the region, cubes
+// are unknown.
 //
-// The state of a cube is known only after the nodes below it were made. So the nodes of a cube of
-// kBufferedEdge cells per edge are made in memory (at most 40 MiB), where a node's bits are set
-// last. For the cubes above, a search for a voxel decides whether they are inner nodes.
+// The bits of a node are known only after the nodes below it were made, but the file has the node
+// first. So all nodes of a cube of kBufferedEdge cells per edge are made in a buffer (at most 40
+// MiB), and the bits of each node are set after its children. Larger cubes do not fit in the
+// buffer. For these, a search for a voxel decides whether they are inner nodes.
 class BtTree {
  public:
-  // Receives the bytes of the next nodes.
+  // Receives the bytes of the next nodes of the file.
   using Write = std::function<void(std::span<const uint8_t> bytes)>;
 
   BtTree(const ExportJob& job, Write write)
@@ -115,15 +121,17 @@ class BtTree {
       region_.high[axis] = job.selection.region.high[axis] + place_[axis];
     }
   }
-  uint64_t nodes = 1, inner_nodes = 0, voxels = 0;  // the root is a node
+  uint64_t nodes = 1, inner_nodes = 0, voxels = 0;  // `nodes` includes the root
 
   void run() { write_upper({-kHalfTree, -kHalfTree, -kHalfTree}, int64_t{1} << kOctoMapLevels); }
 
  private:
   static constexpr int64_t kBufferedEdge = 512;
-  // Cubes without voxels that are partly in the region are divided down to this edge.
+  // A cube without voxels that is only partly in the region is divided until its parts have this
+  // edge, in cells, so that the parts in the region can be free.
   static constexpr int64_t kKnownEdge = 8;
-  // The states of the children of a node.
+  // The states of the children of one node: the two bytes of the node, and whether all children are
+  // full.
   struct Children {
     uint32_t bits = 0;
     bool all_full = true;
@@ -133,7 +141,7 @@ class BtTree {
     return {corner[0] + (child & 1 ? edge : 0), corner[1] + (child & 2 ? edge : 0),
             corner[2] + (child & 4 ? edge : 0)};
   }
-  // Returns the part of the selected region, in cells of the grid, that is in a cube.
+  // Returns the intersection of the selected region and the octree cube, in cells of the grid.
   Region part_of(const Position& corner, int64_t edge) const {
     Region region = job_.selection.region;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -143,8 +151,8 @@ class BtTree {
     }
     return region;
   }
-  // True if a cube is only partly in the region, and this part contains one of the cubes of
-  // kKnownEdge cells per edge into which the octree divides the cube.
+  // True if the cube is only partly in the region, and an octree cube of kKnownEdge cells per edge
+  // is in both.
   bool has_known_part(const Position& corner, int64_t edge) const {
     if (region_.contains(corner, edge)) return false;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -181,8 +189,9 @@ class BtTree {
         write_upper(octomap_corner(corner, child, edge / 2), edge / 2);
   }
 
-  // Adds the nodes of a cube to the buffer. Adds none if the cube is empty or full, unless it
-  // `is_top`.
+  // Adds the nodes of a cube to the buffer, and returns its content. Adds no nodes for a cube that
+  // is full, or that has no voxels unless has_known_part() is true: the node of its parent has its
+  // state. With `is_top`, always adds at least one node.
   Content add_nodes(const Position& corner, int64_t edge, bool is_top) {
     if (!is_top && edge == kBlockEdge) return add_block(corner);
     if (!is_top && !has_voxels(corner, edge) && !has_known_part(corner, edge))
@@ -195,7 +204,7 @@ class BtTree {
       const Position at = octomap_corner(corner, child, edge / 2);
       add(child, add_nodes(at, edge / 2, false), at, edge / 2, children);
     }
-    if (children.all_full && !is_top) {  // the node becomes a leaf; no node is below it
+    if (children.all_full && !is_top) {  // the cube becomes a leaf of its parent
       buffer_.resize(begin);
       nodes = nodes_before;
       return Content::kFull;
@@ -213,7 +222,8 @@ class BtTree {
     add_block_nodes(corner, 0, kBlockEdge);
     return Content::kSomething;
   }
-  // Adds the nodes of a cube of a block. `index` is the index of its first cell.
+  // Adds the nodes of a cube in the current block. `index` is the index in `cells_` of the first
+  // cell of the cube.
   void add_block_nodes(const Position& corner, uint64_t index, int64_t edge) {
     const size_t begin = buffer_.size();
     buffer_.insert(buffer_.end(), {0, 0});
@@ -229,7 +239,8 @@ class BtTree {
     std::ranges::copy(bytes_of(children), buffer_.begin() + static_cast<ptrdiff_t>(begin));
   }
 
-  // Sets the state of a child with this low corner and edge. Returns true if it is an inner node.
+  // Adds the state of a child cube, with this low corner and edge, to `children`. Returns true if
+  // the child is an inner node.
   bool add(int child, Content content, const Position& corner, int64_t edge, Children& children) {
     uint32_t state = region_.contains(corner, edge) ? kFree : kUnknown;
     if (content == Content::kFull && (edge == 1 || edge > kBrickEdge))
@@ -258,7 +269,7 @@ std::string bt_header(uint64_t nodes, double cell_edge) {
          std::to_string(nodes) + "\nres " + number_text(cell_edge) + "\ndata\n";
 }
 
-// Returns the vector from OctoMap's coordinates to scene units.
+// Returns the translation that converts coordinates of the octree to coordinates of the scene.
 std::array<double, 3> translation_of(const ExportJob& job) {
   const Position place = place_of(job);
   std::array<double, 3> translation{};
@@ -281,8 +292,8 @@ std::string translation_note(const ExportJob& job, const std::array<double, 3>& 
   return text;
 }
 
-// Returns the memory that OctoMap allocates for a tree: an object for each node and an array of
-// pointers for each inner node, with the overhead of the allocator.
+// Returns the memory that the OctoMap library allocates to read the file: an object for each node
+// and an array of pointers for each inner node, including the overhead of the allocator.
 uint64_t reader_bytes(uint64_t nodes, uint64_t inner_nodes) {
   return nodes * 32 + inner_nodes * 80;
 }

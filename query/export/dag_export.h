@@ -1,4 +1,5 @@
-// Exports of selections of one file in one format. All exports share the DAG with turned axes.
+// Exports several selections of one file in one format. If the format or the user requests other
+// axes, all of these exports use the same turned copy of the DAG.
 #pragma once
 
 #include <optional>
@@ -13,11 +14,12 @@ namespace voxdag::query {
 
 class DagExport {
  public:
-  // Uses the format, the options, `gray`, `replace` and the memory of the request. `file` must
-  // outlive this object. Throws Error{kInvalidInput} for options that the format does not have.
+  // Uses the members `format`, `options`, `gray`, `replace` and `memory_bytes` of the request, and
+  // ignores the others. `file` must outlive this object. Throws Error{kInvalidInput} for options
+  // that the format does not have.
   DagExport(const voxdag_reader::File& file, const ExportRequest& request);
 
-  // Like export_dag(), for this selection and output.
+  // Like export_dag(), but with this selection and output instead of the request's.
   ExportReport write(FileSystem& files, const Selection& selection, const std::string& output,
                      Progress& progress, const CancelToken& cancel);
   // True if the selection has a set cell.
@@ -30,7 +32,7 @@ class DagExport {
   const AxisTurn turn_;
   MemoryBudget budget_;
   const DagView dag_;
-  std::optional<TurnedDag> turned_;  // made by the first write(), unless the turn is none
+  std::optional<TurnedDag> turned_;  // made by the first write() if turn_ changes the axes
 };
 
 }  // namespace voxdag::query

@@ -37,7 +37,8 @@ constexpr ExportFormat kFormats[] = {
     {"glb", "glTF: a mesh of the surface, for regions", nullptr, nullptr, write_glb},
 };
 
-// Returns the turn from the axes that the format's writer gets by default to the requested ones.
+// Returns the turn of the DAG (axis_turn.h) that makes the file's y axis point along `up`. Without
+// a turn, the format's writer makes it point along format.up.
 AxisTurn turn_of(const ExportFormat& format, UpAxis up) {
   if (up == UpAxis::kOfFormat || up == format.up) return {};
   return up == UpAxis::kZ ? kTurnYToZ : kTurnZToY;

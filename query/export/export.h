@@ -24,21 +24,22 @@ struct ExportReport {
   uint64_t bytes = 0;              // total size of all files
   uint64_t voxels = 0;
   std::vector<std::string> notes;  // usage notes for the files, one sentence each
-  // The numbers of the notes, by name: one number, or the three numbers of a position.
+  // The numbers in the notes, by name: a single number, or the three coordinates of a position.
   std::vector<std::pair<std::string, std::vector<double>>> facts;
 
   void add_fact(const char* name, double number) { facts.push_back({name, {number}}); }
   void add_fact(const char* name, uint64_t number) { add_fact(name, static_cast<double>(number)); }
 };
 
-// The axis of the exported file that gets the y axis of the .vdag file.
+// The axis of the exported file along which the y axis of the .vdag file points. kOfFormat is the
+// default of the format.
 enum class UpAxis { kOfFormat, kY, kZ };
 
-// Options of some formats.
+// Options that only some formats have, except `up`, which all formats have.
 struct ExportOptions {
   UpAxis up = UpAxis::kOfFormat;
   std::string grid;      // vdb, nvdb: density or mask; "" means density
-  bool compact = false;  // npz: only arrays that cannot be computed from the others
+  bool compact = false;  // npz: leave out arrays that can be computed from the others
 };
 
 struct ExportFormat {
@@ -49,8 +50,8 @@ struct ExportFormat {
   const char* suffix;
   const char* second_suffix;
   ExportReport (*write)(const ExportJob& job);
-  UpAxis up = UpAxis::kY;    // axis that gets the file's y axis by default
-  const char* options = "";  // names of the ExportOptions that the format has, after a space each
+  UpAxis up = UpAxis::kY;    // default axis for the file's y axis
+  const char* options = "";  // names of ExportOptions except `up`, each after a space: " grid"
 };
 
 // Returns the formats that this build of voxdag supports. A format that needs a missing library is
@@ -63,7 +64,7 @@ const ExportFormat& export_format(const std::string& name);
 // have the suffix that the format needs.
 std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output);
 
-// Throws Error{kInvalidInput} if the format does not have one of the given options.
+// Throws Error{kInvalidInput} if `options` has a value for an option that the format does not have.
 void check_export_options(const ExportFormat& format, const ExportOptions& options);
 
 struct ExportRequest {

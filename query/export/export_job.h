@@ -21,7 +21,7 @@ namespace voxdag::query {
 struct ExportJob {
   FileSystem& files;
   const voxdag_reader::File& file;
-  const DagView& dag;  // DAG of the file, with turned axes; not empty
+  const DagView& dag;  // DAG of the file after the turn; not empty
   const WatchedFile& watched;
   Selection selection;  // in turned axes
   std::string output;
@@ -33,12 +33,12 @@ struct ExportJob {
   AxisTurn turn;
   ExportOptions options;
 
-  // Returns the coordinate of the grid's low corner on a turned axis, in world space.
+  // Returns the world coordinate of the grid's low corner along an axis of the turned grid.
   double origin(size_t axis) const {
     const double low = file.origin()[turn.from[axis]];
     return turn.reversed[axis] ? -(low + file.edge()) : low;
   }
-  // Returns the cell of the file's grid that is at `cell` of the turned grid.
+  // Converts a cell from turned axes to the axes of the file.
   Position original(const Position& cell) const {
     return turn.is_none() ? cell : turn.original(cell, int64_t{1} << selection.grid_levels);
   }
@@ -100,8 +100,9 @@ class CancelCheck {
 
 // Returns the same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
-// Returns the command line options for the job's selection on a coarser grid: "--level 11", and
-// also "--region", in cells of that grid and in the file's axes, if only a part is selected.
+// Returns command line options that select the same part of the scene on a coarser grid, for
+// messages: "--level 11", followed by "--region" if the job does not select the complete grid. The
+// region is in cells of the coarser grid and in the axes of the file.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
 // Publishes the files and returns their total size in bytes. If a part of the input could not be
@@ -153,8 +154,8 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
 // Returns the name of a cell of the selection's grid, for messages.
 std::string cell_text(const ExportJob& job, const std::array<int64_t, 3>& cell);
-// Returns the color of a selected cell (in turned axes), which must be set. Throws Error{kCorrupt}
-// if it has no color.
+// Returns the color of a cell of the selected grid. The cell must be set and is in turned axes.
+// Throws Error{kCorrupt} if it has no color.
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
                                  const std::array<int64_t, 3>& turned_cell);
 

@@ -116,14 +116,16 @@ class GlbSurface {
         });
   }
 
-  // Calls visit(morton, mask, from) for each brick that can have faces perpendicular to `axis` on
-  // its upper or lower side. BrickMap::mask_at() searches for the next brick on that side from
-  // `from`.
+  // Calls visit(morton, mask, from) for each brick that can have faces on the surface perpendicular
+  // to `axis`: upper faces of cells if `upward` is true, otherwise lower faces. `morton` is the
+  // Morton code of the brick. `from` is the index at which BrickMap::mask_at() must begin its
+  // search for the next brick in this direction.
   template <class Visit>
   void for_each_outer_brick(uint8_t axis, bool upward, const Visit& visit) const {
     const std::vector<BrickMask>& bricks = map_.bricks();
     for (size_t i = 0; i < bricks.size(); ++i) visit(bricks[i].morton, bricks[i].mask, i);
-    // Only the bricks at one side of a full cube can have these faces.
+    // All cells of a full cube are set, so only the bricks at its upper or lower side can have such
+    // faces.
     for (const FullCube& cube : map_.cubes()) {
       Position low = corner_of(cube.morton), at = low;
       if (upward) at[axis] += cube.edge - kBrickEdge;
@@ -134,7 +136,8 @@ class GlbSurface {
     }
   }
 
-  // Returns the mask of a brick's cells that have a face on the surface; see faces_of_brick().
+  // Returns the result of faces_of_brick() for a brick. The arguments are as in
+  // for_each_outer_brick().
   uint64_t exposed(uint64_t morton, uint64_t mask, size_t from, uint8_t axis, bool upward) const {
     uint64_t neighbor = 0;
     if (mask & side_cells(axis, upward))
@@ -152,7 +155,7 @@ class GlbSurface {
     const uint64_t planes = (uint64_t{1} << job_.selection.grid_levels) + kBrickEdge + 1;
     PlaneSort faces(job_.budget, planes, kMemory);
     const MemoryCharge charge(job_.budget, outer_bricks_ * sizeof(uint64_t), kMemory);
-    std::vector<uint64_t> masks;  // exposed() for each outer brick
+    std::vector<uint64_t> masks;  // results of exposed(), in the order of for_each_outer_brick()
     masks.reserve(outer_bricks_);
     for_each_outer_brick(axis, upward, [&](uint64_t morton, uint64_t mask, size_t from) {
       const uint64_t found = masks.emplace_back(exposed(morton, mask, from, axis, upward));

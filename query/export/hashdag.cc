@@ -165,7 +165,7 @@ class HashDagWriter {
   std::vector<uint64_t> enclosed_;
 };
 
-// HashDAG's viewer does not compile for grids of fewer than 2^10 voxels per edge.
+// HashDAG's viewer compiles only for grids of at least 2^10 voxels per edge.
 constexpr uint32_t kMinViewerLevels = 10;
 
 std::string scene_depth_note(uint32_t levels) {

@@ -18,14 +18,17 @@ bool touches(const OverlapBox& box, const Point& low, double edge) {
   return true;
 }
 
-// The distance from a cube along one axis, with a sign; 0 between its sides.
+// Returns the signed distance from the interval [low, high] to `at`: negative below the interval, 0
+// in it, positive above it.
 double excess(double at, double low, double high) {
   return at < low ? at - low : at > high ? at - high : 0;
 }
 
-// Finds the point of the segment that is nearest to a cube. The squared distance is a convex
-// function of the position t on the segment, and its derivative is linear between the positions at
-// which the segment crosses the planes of the cube's sides.
+// Computes the distance between the segment of a capsule and a cube. Let t, 0 to 1, be the position
+// of a point on the segment. The squared distance of this point from the cube is a convex function
+// of t. Its derivative is linear between the positions at which the segment crosses the planes of
+// the cube's faces. So the minimum is found exactly: it is where the derivative is 0, or at an end
+// of the segment.
 class SegmentDistance {
  public:
   SegmentDistance(const Capsule& capsule, const Point& low, double edge)
@@ -43,7 +46,7 @@ class SegmentDistance {
   double excess_at(size_t axis, double t) const {
     return excess(capsule_.from[axis] + t * direction(axis), low_[axis], low_[axis] + edge_);
   }
-  // Half the derivative of the squared distance.
+  // Returns half the derivative of the squared distance at t.
   double slope(double t) const {
     double sum = 0;
     for (size_t axis = 0; axis < 3; ++axis) sum += direction(axis) * excess_at(axis, t);
@@ -77,7 +80,7 @@ bool touches(const Capsule& capsule, const Point& low, double edge) {
   return SegmentDistance(capsule, low, edge).squared() < capsule.radius * capsule.radius;
 }
 
-// Searches the cells that overlap a shape.
+// Searches for a set cell that overlaps a shape. Skips cubes that do not overlap it.
 template <class Shape>
 class OverlapSearch {
  public:

@@ -10,8 +10,8 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint32_t kPageDepth = 3;         // levels from a page's cube to its cells
-constexpr size_t kColorBlockWords = 4096;  // a block ends with the page that exceeds this size
+constexpr uint32_t kPageDepth = 3;         // levels from the cube of a page to its cells
+constexpr size_t kColorBlockWords = 4096;  // a block ends with the page that reaches this size
 
 std::array<uint64_t, 3> position_of(uint64_t code) {
   uint32_t x = 0, y = 0, z = 0;
@@ -35,7 +35,8 @@ void ColorBands::write_level(uint32_t level) {
   if (!block_.empty()) end_block();
 }
 
-// Visits the cubes of the pages in a cube at `depth`, whose Morton code is `code`.
+// Adds the pages that are in one cube of the octree. `depth` is the level of the cube, `content`
+// its node or brick (DagView), and `code` the Morton code of its position in cubes of this level.
 void ColorBands::visit(uint32_t depth, uint64_t content, uint64_t code, ColorPages& encoder) {
   if (depth + kPageDepth >= std::max(level_, kPageDepth)) return add_page(code, encoder);
   NodeChecks(dag_, depth, &blocks_).expect_intact(content);

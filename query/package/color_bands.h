@@ -1,5 +1,5 @@
-// Writes the color pages of a file to a package, level by level. The pages of a level are in Morton
-// order. Not thread-safe.
+// Writes the bands of color pages of a package (package_index.h), one band per level. The pages of
+// a level are in Morton order. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -18,12 +18,12 @@ namespace voxdag::query {
 
 class ColorBands {
  public:
-  // The arguments must outlive this object. `file` may be without colors.
+  // All arguments must outlive this object. If `file` has no colors, nothing is written.
   ColorBands(const voxdag_reader::File& file, const DagView& dag, const CheckedBlocks& blocks,
              PackWriter& packs, const CancelToken& cancel)
       : file_(file), dag_(dag), blocks_(blocks), packs_(packs), cancel_(cancel) {}
 
-  // Writes the pages of all levels up to `last` that are not written yet.
+  // Writes the bands of the next levels, up to the level `last`. Does not write a level twice.
   void write_levels(uint32_t last);
   uint64_t pages() const { return pages_; }
 
@@ -39,8 +39,8 @@ class ColorBands {
   PackWriter& packs_;
   const CancelToken& cancel_;
   uint32_t next_level_ = 0;
-  uint32_t level_ = 0;            // the current level
-  std::vector<CodedPage> block_;  // pages of the current block
+  uint32_t level_ = 0;            // level of the current band
+  std::vector<CodedPage> block_;  // pages of the current block so far
   size_t block_words_ = 0;
   uint64_t pages_ = 0;
 };

@@ -8,7 +8,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr size_t kMaxPageWords = 17 + 512;
-constexpr size_t kEntryWords = 3;  // of a page in the head of a block
+constexpr size_t kEntryWords = 3;  // per page, at the beginning of a block: code and size
 
 }  // namespace
 

@@ -1,4 +1,5 @@
-// Blocks of color pages in a package (docs/format.md, "Blocks of color pages").
+// Encodes and decodes the blocks of color pages of a package (docs/format.md, "Blocks of color
+// pages").
 #pragma once
 
 #include <cstdint>
@@ -8,15 +9,18 @@
 
 namespace voxdag::query {
 
-// A color page (query/tiles/color_page.h), and the Morton code of its position.
+// The words of a color page (query/tiles/color_page.h), and the Morton code of its position in
+// pages.
 struct CodedPage {
   uint64_t code = 0;
   std::vector<uint32_t> words;
 };
 
-// Returns the bytes of a block, not compressed. The pages are in the order of their codes.
+// Returns the uncompressed bytes of a block with these pages. The pages must be in increasing order
+// of their codes.
 std::string encode_color_block(const std::vector<CodedPage>& pages);
-// Throws Error{kCorrupt} for bytes that encode_color_block() cannot have written.
+// Returns the pages of a block. Throws Error{kCorrupt} for bytes that encode_color_block() cannot
+// have returned.
 std::vector<CodedPage> decode_color_block(std::string_view bytes);
 
 }  // namespace voxdag::query

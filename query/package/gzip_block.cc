@@ -10,7 +10,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr int kBlockLevel = 6;
-constexpr int kGzipWindowBits = 15 + 16;  // window of 32 KiB, with gzip's header
+constexpr int kGzipWindowBits = 15 + 16;  // zlib: 15 for a window of 32 KiB, + 16 for gzip's header
 constexpr int kMemoryLevel = 8;
 constexpr size_t kFirstBytes = size_t{64} << 10;
 
@@ -30,7 +30,8 @@ std::string gzip_block(std::string_view plain) {
   set_input(stream, plain);
   stream.next_out = reinterpret_cast<Bytef*>(out.data());
   stream.avail_out = static_cast<uInt>(out.size());
-  // One call compresses all bytes, because the output has space for the worst case.
+  // One call compresses all bytes, because `out` is large enough for the worst case
+  // (deflateBound()).
   deflate(&stream, Z_FINISH);
   out.resize(stream.total_out);
   deflateEnd(&stream);

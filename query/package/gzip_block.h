@@ -1,5 +1,5 @@
-// Compression of the blocks of a package, as browsers can decompress them. The checksum in each
-// gzip block detects damage.
+// Compresses the blocks of a package with gzip, which browsers can decompress. Each gzip block has
+// a checksum of its contents, which detects damage.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,10 @@
 
 namespace voxdag::query {
 
-// The result depends only on `plain` and on the version of zlib.
+// Returns the compressed bytes of `plain`. They depend only on `plain` and on the version of zlib.
 std::string gzip_block(std::string_view plain);
-// Throws Error{kCorrupt} if the bytes are damaged, or if the result has more than `max_bytes`
-// bytes.
+// Returns the decompressed bytes. Throws Error{kCorrupt} if `bytes` is damaged, or if the result
+// would have more than `max_bytes` bytes.
 std::string gunzip_block(std::string_view bytes, size_t max_bytes);
 
 }  // namespace voxdag::query

@@ -1,4 +1,4 @@
-// Writes the packs and the directory of a package. Not thread-safe.
+// Writes the packs and the directory of a package (package_index.h). Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -15,17 +15,19 @@ namespace voxdag::query {
 
 class PackWriter {
  public:
-  // Writes to `folder`, which must exist. A pack is complete when its next block would exceed
-  // `pack_bytes`; the first pack, when its next block would exceed kFirstPackBytes.
+  // Writes the files to `folder`, which must exist. Begins a new pack before a block that does not
+  // fit in the current one. A pack has at most `pack_bytes` bytes; the first pack has at most
+  // kFirstPackBytes if that is less.
   PackWriter(FileSystem& files, const std::string& folder, uint64_t pack_bytes);
 
   void begin_band(bool is_color, uint32_t level);
-  // Adds a compressed block of the current band. `items` is its number of tiles or color pages,
-  // `code` the code of its first color page.
+  // Adds a compressed block to the current band. `items` is the number of tiles or color pages in
+  // the block. `code` is the Morton code of its first color page; it is 0 for tiles.
   void add_block(std::string_view bytes, uint64_t items, uint64_t code);
-  // Completes the files. Returns the index, without manifest and viewer.
+  // Completes the packs and writes the directory. Returns the index of the package, in which the
+  // manifest and the files of the viewer are missing.
   PackageIndex finish();
-  // Number of bytes in complete and incomplete packs.
+  // Returns the number of bytes in all packs so far.
   uint64_t bytes() const { return bytes_; }
 
  private:
@@ -37,13 +39,13 @@ class PackWriter {
   const std::string folder_;
   const uint64_t pack_bytes_;
   PackageIndex index_;
-  std::unique_ptr<WritableFile> out_;  // the current pack
+  std::unique_ptr<WritableFile> out_;  // file of the current pack
   Checksum64 checksum_;                // of the current pack
   PackageFile pack_;                   // the current pack
   uint64_t bytes_ = 0;
-  DirectoryPage page_;             // the current page
-  std::vector<uint16_t> lengths_;  // of the blocks of the current page
-  std::vector<uint64_t> codes_;    // of the color blocks of the current page
+  DirectoryPage page_;             // current page of the directory
+  std::vector<uint16_t> lengths_;  // compressed sizes of the page's blocks
+  std::vector<uint64_t> codes_;    // codes of the page's color blocks
   std::string directory_;
 };
 

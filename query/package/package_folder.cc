@@ -11,7 +11,9 @@ namespace {
 constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
 constexpr const char* kWorkSuffix = ".work-";
 
-// Removes slashes at the end, which would make names of temporary files point into the folder.
+// Returns `path` without slashes at its end. With a slash, the names of temporary files, which are
+// `path` and a suffix, would be names in the folder itself. Throws Error{kInvalidInput} if the path
+// has no name.
 std::string without_slash(std::string path) {
   while (path.size() > 1 && path.ends_with('/')) path.pop_back();
   if (path.empty() || path == "/" || path == "." || path == "..")
@@ -32,7 +34,8 @@ PackageIndex index_of_folder(FileSystem& files, const std::string& folder) {
   return parse_index(read_small_file(files, path, kMaxIndexBytes), path);
 }
 
-// Returns the names of the files that a package has besides package.json and index.html.
+// Returns the names of all files of a package whose names contain a hash: all except package.json
+// and index.html.
 std::set<std::string> hashed_files(const PackageIndex& index) {
   std::set<std::string> names = {index.directory.name};
   for (const PackageFile& pack : index.packs) names.insert(pack.name);
@@ -57,7 +60,8 @@ void refuse_other_folder(FileSystem& files, const std::string& path) {
   }
 }
 
-// True if a killed process left its lock file.
+// True if the lock file of a killed process is still present. Throws Error{kInvalidInput} or
+// Error{kNotFound} if no package can be written to `path`.
 bool has_left_lock(FileSystem& files, const std::string& path) {
   refuse_other_folder(files, path);
   const auto lock = open_if_there(files, OutputLock::path_of(path));
@@ -92,7 +96,7 @@ PackageFolder::PackageFolder(FileSystem& files, const std::string& path)
 
 void PackageFolder::publish(const PackageIndex& index) {
   files_.sync_directory(new_files());
-  refuse_other_folder(files_, path_);  // another program may have created it
+  refuse_other_folder(files_, path_);  // another program may have created it since
   if (files_.exists(path_) && !files_.list(path_).empty()) {
     update(index);
   } else {
@@ -104,8 +108,10 @@ void PackageFolder::publish(const PackageIndex& index) {
   files_.sync_directory(parent_directory(path_));
 }
 
-// The names of most files contain the hash of their contents, so files of the old and of the new
-// package do not replace each other. package.json decides which files a viewer reads.
+// Replaces the existing package. First moves the new files whose names contain a hash: they do not
+// overwrite files of the old package, because different contents have different names. Then
+// replaces index.html and package.json. From then on, viewers read only the new files. At the end,
+// removes the files that only the old package has.
 void PackageFolder::update(const PackageIndex& index) {
   const std::set<std::string> old_files = hashed_files(index_of_folder(files_, path_)),
                               new_files = hashed_files(index);

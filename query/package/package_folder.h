@@ -1,6 +1,7 @@
-// The folder of a package while it is written. A new package is written to a temporary folder and
-// then gets its name in one step. The files of an existing package are replaced in an order in
-// which web servers can serve the folder at any time.
+// The output folder of a package. All files are first written to a temporary folder. A new package
+// then gets its final name in one step. If the folder already has a package, its files are replaced
+// in an order that always leaves a complete package, so a web server can serve the folder at any
+// time.
 #pragma once
 
 #include <string>
@@ -14,17 +15,18 @@ namespace voxdag::query {
 
 class PackageFolder {
  public:
-  // Throws Error: kIo if another process writes the same package; kInvalidInput if `path` exists
-  // and is neither a package nor an empty folder; kNotFound if its parent folder does not exist.
-  // Removes the temporary folder of a killed process.
+  // Creates the temporary folder. Removes the temporary folder of a killed process. Throws Error:
+  // kIo if another process writes a package to `path`; kInvalidInput if `path` exists and is
+  // neither a package nor an empty folder; kNotFound if the parent folder of `path` does not exist.
   PackageFolder(FileSystem& files, const std::string& path);
 
-  // Returns the folder to which the files of the package are written.
+  // Returns the temporary folder for the files of the new package.
   std::string new_files() const { return work_.path() + "/package"; }
-  // Returns a folder for temporary files.
+  // Returns a temporary folder for data that is not part of the package.
   std::string scratch() const { return work_.path() + "/scratch"; }
-  // Moves the files of new_files() to their final folder. If the folder already has a package,
-  // removes the files of this package that the new one does not have. All other files remain.
+  // Moves the files of new_files() to `path`. `index` is the index of the new package. If `path`
+  // already has a package, removes the files that only the old package has. Files that belong to
+  // neither package remain.
   void publish(const PackageIndex& index);
 
  private:

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "voxdag package";
 constexpr int kVersion = 1;
-constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // JavaScript has exact integers up to it
+constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // integers up to this are exact in JavaScript
 
 Json file_json(const PackageFile& file, bool is_pack) {
   Json json = {{"name", file.name}, {"bytes", file.bytes}};
@@ -24,8 +24,8 @@ Json file_json(const PackageFile& file, bool is_pack) {
   return json;
 }
 
-// Names of files come from a file that anyone may have written. A name must not lead out of the
-// package's folder.
+// True if the file name `name` cannot lead out of the folder of the package. Names come from
+// package.json, which anyone may have written.
 bool is_safe_name(const std::string& name) {
   if (name.empty() || name[0] == '/' || name[0] == '.') return false;
   if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-./") != name.npos) return false;

@@ -1,8 +1,10 @@
 // The index of a package, package.json (docs/format.md, "Packages").
 //
-// A package is a folder of files for web servers: the tiles and color pages of one DAG, for viewers
-// that need no voxdag server. Blocks are the units that viewers decode. Packs are files of blocks.
-// Blocks are numbered in the order in which the packs store them.
+// A package is a folder with the tiles and color pages of one DAG, and a viewer. Any web server can
+// serve it. Several tiles or color pages are compressed together as a block. Several blocks are
+// stored in one file, a pack. Blocks are numbered from 0, in the order in which they are stored.
+// The directory is a file with the sizes of all blocks. It consists of pages, which are compressed
+// separately.
 #pragma once
 
 #include <cstdint>
@@ -13,32 +15,31 @@
 
 namespace voxdag::query {
 
-// Maximum number of levels of nodes in a tile of a package. Each tile that a view needs brings
-// tiles that it does not need into the same block, so tiles are smaller than the tiles of the
-// service.
+// Maximum number of levels of nodes in a tile of a package. It is smaller than for the tiles of the
+// service: a viewer can only load complete blocks, and so loads many tiles that it does not need.
 inline constexpr uint32_t kPackageTileLevels = 2;
-// Number of tiles in a block. The last block of a band may have fewer.
+// Number of tiles in a block. The last block of a band (PackageBand) may have fewer.
 inline constexpr uint32_t kBlockTiles = 64;
-// Number of blocks whose entries a page of the directory has. The last page may have fewer.
+// Number of blocks that a page of the directory describes. The last page may describe fewer.
 inline constexpr uint64_t kPageBlocks = 4096;
-// Size of the first pack, which viewers read completely. Other packs are larger.
+// Maximum size of the first pack. Viewers read this pack completely when they start.
 inline constexpr uint64_t kFirstPackBytes = uint64_t{256} << 10;
 
-// A band is a sequence of blocks: the tiles whose roots are on one level, or the color pages of one
-// level.
+// A band: the blocks with all tiles whose roots are on `level`, or with all color pages of `level`.
 struct PackageBand {
   bool is_color = false;
   uint32_t level = 0;
-  uint64_t items = 0;  // tiles or pages
+  uint64_t items = 0;  // number of tiles or color pages
   uint64_t blocks = 0;
 };
 
-// A page of the directory, and the place of the first block that it describes.
+// A page of the directory. `bytes` is the compressed size of the page. The other members describe
+// the first of its blocks: the number of the pack, the offset in the pack, and the code.
 struct DirectoryPage {
   uint64_t bytes = 0;
   uint64_t pack = 0;
   uint64_t offset = 0;
-  uint64_t code = 0;  // of the first color page in the block; 0 for tiles
+  uint64_t code = 0;  // Morton code of the first color page in the block; 0 for tiles
 };
 
 struct PackageFile {
@@ -48,22 +49,23 @@ struct PackageFile {
 };
 
 struct PackageIndex {
-  std::string manifest;  // JSON, as the service sends it, for tiles of kPackageTileLevels levels
-  std::vector<PackageBand> bands;  // in the order of their blocks
+  std::string manifest;  // JSON as in docs/api.md, with kPackageTileLevels as "tile_levels"
+  std::vector<PackageBand> bands;  // in the order in which their blocks are stored
   PackageFile directory;
   std::vector<DirectoryPage> pages;
   std::vector<PackageFile> packs;
-  std::vector<PackageFile> viewer;  // files of the viewer that have the hash of their contents
+  std::vector<PackageFile> viewer;  // viewer files whose names contain a hash
 };
 
 inline constexpr const char* kIndexName = "package.json";
 
 std::string index_text(const PackageIndex& index);
-// Parses the text of package.json and checks that its numbers are consistent. Throws
-// Error{kCorrupt}, or Error{kUnsupportedVersion}; messages begin with `path`.
+// Parses the text of package.json, and checks that its numbers are consistent. Throws
+// Error{kCorrupt}, or Error{kUnsupportedVersion} for a version that this program does not know.
+// `path` begins the messages.
 PackageIndex parse_index(std::string_view text, const std::string& path);
 
-// Returns `stem`-HASH`suffix`, where HASH is the hash of the contents.
+// Returns the file name `stem`-HASH`suffix`. HASH is the XXH64 of `contents`, as 16 hex digits.
 std::string hashed_name(const std::string& stem, std::string_view contents,
                         const std::string& suffix);
 

@@ -1,5 +1,5 @@
-// Reads and checks a package (package_index.h). Anyone may have written or damaged its files, so
-// all sizes are checked. Not thread-safe.
+// Reads and checks a package (package_index.h). The files may be damaged or malicious, so all sizes
+// in them are checked. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -16,26 +16,29 @@ namespace voxdag::query {
 
 class PackageReader {
  public:
-  // Reads the index and the directory. Throws Error{kNotFound} without an index, Error{kCorrupt},
-  // or Error{kUnsupportedVersion}.
+  // Reads the index and the directory of the package in `folder`. Throws Error: kNotFound if the
+  // folder has no index; kCorrupt; kUnsupportedVersion.
   PackageReader(FileSystem& files, const std::string& folder);
 
   const PackageIndex& index() const { return index_; }
-  // Number of levels of the grid.
+  // Returns the number L of levels of the grid, which has 2^L voxels per edge.
   uint32_t grid_levels() const { return grid_levels_; }
-  // Returns the words of the tile with this number in the band of `level`. The address of a cut-off
-  // node has a number instead of a word offset. Throws Error{kNotFound} if there is no such tile,
-  // Error{kCorrupt} if its block is damaged.
+  // Returns the words of a tile, as encode_tile() returns them, with one difference: the address of
+  // a cut-off node is the number of the next tile, not a word offset. `number` is the number of the
+  // tile among the tiles whose roots are on `level`. Throws Error{kNotFound} if the package has no
+  // such tile, and Error{kCorrupt} if its block is damaged.
   std::vector<uint32_t> tile(uint32_t level, uint64_t number) const;
-  // Returns the words of a color page (color_page.h); {0} if none of the page's cells is set.
+  // Returns the words of a color page (color_page.h). The result is {0} if no cell of the page is
+  // set.
   std::vector<uint32_t> color_page(uint32_t level, const std::array<uint64_t, 3>& position) const;
 
-  // Checks all files: their sizes and hashes, every block, and that each tile is referred to.
-  // Throws the Error of the first problem.
+  // Checks the package: the sizes and hashes of all files, the contents of all blocks, and that the
+  // tiles of each band are exactly those to which the band above refers. Throws the Error of the
+  // first problem.
   void check(Progress& progress, const CancelToken& cancel) const;
 
  private:
-  // The place of a block.
+  // Where a block is stored. `code` is the Morton code of its first color page; it is 0 for tiles.
   struct Place {
     uint64_t pack = 0;
     uint64_t offset = 0;

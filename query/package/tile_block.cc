@@ -21,7 +21,8 @@ void set_bit(std::string& bits, size_t index) {
   bits[index / 8] = static_cast<char>(bits[index / 8] | 1 << index % 8);
 }
 
-// Reads the columns of a block.
+// Reads the columns of a block one after the other. Throws Error{kCorrupt} after the end of the
+// block.
 class Columns {
  public:
   explicit Columns(std::string_view bytes) : left_(bytes) {}
@@ -32,7 +33,8 @@ class Columns {
     left_.remove_prefix(count);
     return column;
   }
-  // Reads `count` numbers of `bytes` bytes. The column of the lowest bytes comes first.
+  // Reads `count` numbers of `bytes` bytes each. Byte i of all numbers is in one column. The first
+  // column has the lowest bytes.
   std::vector<uint64_t> take_numbers(size_t bytes, size_t count) {
     std::vector<uint64_t> numbers(count);
     for (size_t byte = 0; byte < bytes; ++byte) {
@@ -50,22 +52,22 @@ class Columns {
   std::string_view left_;
 };
 
-// The content of a leaf: a brick, or the number and the coarse brick of a cut-off node.
+// A leaf of a tile: the mask of a brick, or the coarse brick and the tile number of a cut-off node.
 struct Leaf {
   uint64_t mask = 0;
   uint32_t number = 0;
   bool operator==(const Leaf&) const = default;
 };
 
-// A node of an expanded tile: its child mask, and the indexes of its children among the distinct
-// nodes or leaves of the next level.
+// A node of a tile while TileBuilder shares equal nodes: its child mask, and the index of each
+// child in the list of distinct nodes of the next level, or of distinct leaves.
 struct ExpandedNode {
   uint32_t mask = 0;
   std::vector<uint32_t> children;
   bool operator==(const ExpandedNode&) const = default;
 };
 
-// Returns the index of the item. Adds an item that is new.
+// Returns the index of `item` in the list. Adds the item to the list if it is new.
 template <class Item>
 uint32_t index_in(std::vector<Item>& items, const Item& item) {
   for (size_t i = 0; i < items.size(); ++i)
@@ -74,8 +76,9 @@ uint32_t index_in(std::vector<Item>& items, const Item& item) {
   return static_cast<uint32_t>(items.size() - 1);
 }
 
-// Makes the words of a tile from its expanded form: the child masks of each level, and the leaves,
-// without sharing. In a canonical DAG, nodes are equal exactly if their contents are equal.
+// Makes the words of a tile from its expanded form, in which no node or leaf is shared: the child
+// masks of each level, and the leaves. Shares all equal nodes, from the leaves up. This restores
+// the original tile, because equal nodes of a canonical DAG are one node.
 class TileBuilder {
  public:
   TileBuilder(uint32_t level, uint32_t levels, bool bricks)
@@ -84,7 +87,7 @@ class TileBuilder {
   std::vector<uint32_t> build(const std::vector<std::string>& masks,
                               const std::vector<Leaf>& leaves) const {
     std::vector<Leaf> distinct_leaves;
-    std::vector<uint32_t> children;  // of the level above, expanded
+    std::vector<uint32_t> children;  // by edge from the level above: index of the child
     for (const Leaf& leaf : leaves) children.push_back(index_in(distinct_leaves, leaf));
     std::vector<std::vector<ExpandedNode>> nodes(levels_);
     for (uint32_t level = levels_; level-- > 0;) {
@@ -142,7 +145,8 @@ size_t children_of(std::string_view masks) {
   return children;
 }
 
-// Reads the numbers to which the leaves refer. Advances `next` past the new numbers.
+// Reads the tile numbers of the leaves, which are cut-off nodes. `next` is the next number to which
+// no leaf has referred yet; it is increased for each leaf that refers to it.
 void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next) {
   const std::string_view is_old = columns.take((leaves.size() + 7) / 8);
   const auto old = [&](size_t i) { return is_old[i / 8] >> i % 8 & 1; };
@@ -233,7 +237,7 @@ TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32
   if (!bricks) read_references(columns, leaves, block.next);
   columns.expect_end();
   const TileBuilder builder(level, levels, bricks);
-  std::vector<size_t> at(levels + 1, 0);  // the position in each column
+  std::vector<size_t> at(levels + 1, 0);  // the tile's first node on each level, and first leaf
   for (uint32_t tile = 0; tile < count; ++tile) {
     std::vector<std::string> masks_of_tile;
     size_t width = 1;

@@ -1,6 +1,6 @@
-// Blocks of tiles in a package (docs/format.md, "Blocks of tiles"). The tiles have the words of
-// encode_tile(), except that the address of a cut-off node has the node's number in its band
-// instead of a word offset.
+// Encodes and decodes the blocks of tiles of a package (docs/format.md, "Blocks of tiles"). A tile
+// has the words of encode_tile(), except that the address of a cut-off node is the number of the
+// tile that begins there (tile_numbers.h), not its word offset.
 #pragma once
 
 #include <array>
@@ -13,41 +13,43 @@
 
 namespace voxdag::query {
 
-// Index of the first leaf's words in a tile.
+// Returns the index of the first leaf in the words of a tile.
 inline size_t leaves_begin(const std::vector<uint32_t>& tile) { return 4 + size_t{tile[2]}; }
 inline bool has_bricks(const std::vector<uint32_t>& tile) { return tile[1] >> 16 & 1; }
 
 class TileBlockEncoder {
  public:
-  // `next` is the first number that no earlier block of the band refers to. Numbers are given in
-  // the order of the first references to them.
+  // `next` is the smallest tile number to which no earlier block of the band refers. Tile numbers
+  // follow the order of the first references to the tiles, so the first new reference in the block
+  // has this number.
   explicit TileBlockEncoder(uint32_t next) : first_(next), next_(next) {}
-  // Adds a tile of at most kPackageTileLevels levels. All tiles of a block have the same shape.
+  // Adds a tile of at most kPackageTileLevels levels. All tiles of a block must have the same
+  // number of levels and the same kind of leaves.
   void add(const std::vector<uint32_t>& tile);
-  // Returns the bytes of the block, not compressed.
+  // Returns the bytes of the block before compression.
   std::string finish() const;
 
  private:
   void add_leaf(const std::vector<uint32_t>& tile, size_t leaf);
 
   uint32_t first_, next_;
-  std::array<std::string, kPackageTileLevels> masks_;  // by level
-  std::array<std::string, 8> bricks_;                  // by byte of the mask
+  std::array<std::string, kPackageTileLevels> masks_;  // child masks, by level of the tile
+  std::array<std::string, 8> bricks_;                  // bytes of all leaves' masks, by byte
   bool has_references_ = false;
   size_t leaves_ = 0;
-  std::string is_old_;              // one bit per leaf: a number that was referred to before
-  std::array<std::string, 4> old_;  // by byte of the distance to the next number
+  std::string is_old_;  // one bit per leaf: 1 if an earlier leaf of the band has the same number
+  std::array<std::string, 4> old_;  // bytes of the distances to the next new number, by byte
 };
 
 // The tiles of a block.
 struct TileBlock {
-  uint32_t first = 0;  // the next number before the block
-  uint32_t next = 0;   // the next number after the block
+  uint32_t first = 0;  // the next new tile number before the block
+  uint32_t next = 0;   // the next new tile number after the block
   std::vector<std::vector<uint32_t>> tiles;
 };
 
 // Decodes a block of `count` tiles whose roots are on `level`, in a grid of `grid_levels` levels.
-// Throws Error{kCorrupt} for bytes that TileBlockEncoder cannot have written.
+// Throws Error{kCorrupt} for bytes that TileBlockEncoder cannot have returned.
 TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32_t level,
                             uint32_t count);
 

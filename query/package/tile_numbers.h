@@ -1,6 +1,6 @@
-// The numbers of the tiles of a band. A tile's number depends only on the DAG's contents: the
-// numbers follow the order in which a walk over the tiles of the band above first meets the tiles.
-// Not thread-safe.
+// Numbers the tiles of a band (package_index.h). The tiles get the numbers 0, 1, ... in the order
+// in which a walk over the tiles of the band above first reaches them. So the numbers depend only
+// on the contents of the DAG, not on the order of its nodes in the file. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,9 @@ namespace voxdag::query {
 
 class TileNumbers {
  public:
-  // For the nodes on `level`, which is above the bricks. Throws Error{kOutOfMemory} if the numbers
-  // do not fit in the budget: 4 bytes per node, and 2 bits per word of the level.
+  // The tiles have their roots on `level`, which must be above the bricks. Throws
+  // Error{kOutOfMemory} if the numbers do not fit in the budget: they need 4 bytes per node and 2
+  // bits per word of the level.
   TileNumbers(const voxdag_reader::File& file, uint32_t level, unsigned threads,
               const SpillSpace& space, const CancelToken& cancel)
       : path_(file.path()),
@@ -30,7 +31,8 @@ class TileNumbers {
                                          " has more than 2^32 nodes: expected fewer for a package");
   }
 
-  // Returns the number of the node at a word offset. A new node gets the next number.
+  // Returns the number of the tile whose root is at a word offset. On the first call for a root,
+  // gives its tile the next number.
   uint32_t number(uint64_t offset) {
     const uint64_t node = nodes_.find(offset);
     if (node == NodeIndex::kNone)
@@ -44,14 +46,14 @@ class TileNumbers {
     return number - 1;
   }
   uint32_t count() const { return count_; }
-  // The word offsets of the nodes, in the order of their numbers.
+  // Returns the word offsets of the roots, in the order of the tile numbers.
   SpillList<uint64_t>& offsets() { return offsets_; }
 
  private:
   const std::string path_;
   const uint32_t level_;
   const NodeIndex nodes_;
-  PageBuffer<uint32_t> numbers_;  // 1 + number; 0 for a node without number
+  PageBuffer<uint32_t> numbers_;  // by node: 1 + number; 0 if it has no number yet
   SpillList<uint64_t> offsets_;
   uint32_t count_ = 0;
 };

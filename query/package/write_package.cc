@@ -22,11 +22,11 @@ namespace voxdag::query {
 namespace {
 
 constexpr size_t kDigestDigits = 32;
-constexpr uint64_t kWindowBlocks = 64;  // encoded together
-constexpr uint64_t kRootsShare = 16;    // of the memory
+constexpr uint64_t kWindowBlocks = 64;  // blocks that are encoded concurrently
+constexpr uint64_t kRootsShare = 16;    // divisor of the memory: memory of a list of roots
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
 
-// Writes the bands of a file, from coarse to fine.
+// Writes the bands of tiles and color pages of a file, from coarse to fine.
 class BandWriter {
  public:
   BandWriter(const voxdag_reader::File& file, const PackageSpec& spec, const SpillSpace& space,
@@ -54,7 +54,8 @@ class BandWriter {
       auto next = write_band(level, *roots);
       numbers = std::move(next);  // releases the numbers of the band above
       if (numbers) roots = &numbers->offsets();
-      // The cells of coarse bricks are two levels below the end of the tiles.
+      // The coarse bricks at the end of a tile have cells two levels below its end. The colors of
+      // these cells follow the tiles.
       if (spec_.colors) colors_.write_levels(end_of(level) + kBrickLevels);
     }
     if (spec_.colors) colors_.write_levels(dag_.grid_levels());
@@ -76,7 +77,8 @@ class BandWriter {
     return count;
   }
 
-  // Writes the tiles of a band. Returns the numbers of the tiles below; null for tiles with bricks.
+  // Writes the tiles whose roots are on `level`, at the word offsets `roots`. Returns the numbers
+  // of the tiles below them; null if the tiles end with bricks.
   std::unique_ptr<TileNumbers> write_band(uint32_t level, const SpillList<uint64_t>& roots) {
     const uint32_t end = end_of(level);
     std::unique_ptr<TileNumbers> below;
@@ -129,7 +131,7 @@ class BandWriter {
     progress_.advance(offsets.size());
   }
 
-  // Replaces the word offsets of the cut-off nodes by their numbers.
+  // Replaces the word offset of each cut-off node by the number of the tile that begins there.
   static void number_leaves(std::vector<uint32_t>& tile, TileNumbers& below) {
     for (size_t at = leaves_begin(tile); at < tile.size(); at += 4) {
       tile[at] = below.number(tile[at] | uint64_t{tile[at + 1]} << 32);
@@ -156,14 +158,16 @@ void write_file(FileSystem& files, const std::string& path, std::string_view con
   out->close();
 }
 
-// Returns the digest of a package. It changes with every change that a viewer could notice.
+// Returns the digest of a package. It depends on the manifest and, through the hashes in the file
+// names, on the directory and all packs.
 std::string digest_of(const PackageIndex& index) {
   std::string text = index.manifest + index.directory.name;
   for (const PackageFile& pack : index.packs) text += pack.name;
   return sha256_hex(text).substr(0, kDigestDigits);
 }
 
-// Adds the digest, which depends on the packs.
+// Sets the manifest of the index: the manifest of the request with the digest, and without the
+// member "colors" if no colors were written.
 void complete_manifest(const PackageSpec& spec, PackageIndex& index) {
   index.manifest = spec.manifest;
   auto manifest = nlohmann::ordered_json::parse(spec.manifest);

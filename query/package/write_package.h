@@ -1,9 +1,9 @@
-// Writes the tiles and color pages of a global file as a package (package_index.h). The bytes
-// depend only on the DAG, its colors, the options that are documented here, and the version of
-// zlib.
+// Writes the tiles and color pages of a global file as a package (package_index.h). The bytes of
+// the package depend only on the voxels and colors, on the members `manifest`, `colors` and
+// `pack_bytes` of PackageSpec, on the files of the viewer, and on the version of zlib.
 //
-// The blocks of a band are encoded in parallel. The memory is limited by the budget: only the
-// numbers of the tiles of one band must be in memory (tile_numbers.h).
+// Several threads encode the blocks of a band. PackageSpec::memory_bytes limits the memory. Only
+// the tile numbers of one band must fit in it (tile_numbers.h); other data is read in parts.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,8 @@
 
 namespace voxdag::query {
 
-// A file of the viewer. The name of a hashed file gets the hash of its contents.
+// A file of the viewer. All names except index.html contain the hash of the contents
+// (hashed_name()).
 struct ViewerFile {
   std::string name;
   std::string contents;
@@ -27,14 +28,15 @@ struct ViewerFile {
 
 struct PackageSpec {
   std::string output;  // the folder
-  // Manifest for viewers, as JSON, without digest. It must fit tiles of kPackageTileLevels levels.
+  // The manifest for viewers (docs/api.md), as JSON. write_package() adds the digest. The member
+  // "tile_levels" must be kPackageTileLevels.
   std::string manifest;
-  bool colors = true;  // write the colors of a file that has colors
+  bool colors = true;  // also write the colors, if the file has any
   uint64_t pack_bytes = uint64_t{8} << 20;
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;
-  // Maximum memory of a list of nodes, in addition to the share of memory_bytes. Tests set a small
-  // limit.
+  // Additional limit for the memory of a list of nodes, which also is at most a share of
+  // memory_bytes. Tests use a small limit.
   uint64_t list_bytes = ~uint64_t{0};
 };
 
@@ -48,8 +50,8 @@ struct PackageReport {
   std::string digest;
 };
 
-// `page` is the viewer's page, index.html, and `modules` are further files of the viewer, whose
-// names have the hash of their contents already. Both may be empty. Throws Error:
+// Writes the package. `viewer` has the files of the viewer: index.html, and files whose names
+// contain the hash of their contents. It may be empty. Throws Error:
 // - the errors of PackageFolder;
 // - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled.
 PackageReport write_package(const voxdag_reader::File& file, const PackageSpec& spec,

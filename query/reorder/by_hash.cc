@@ -11,14 +11,15 @@
 namespace voxdag::query {
 namespace {
 
-// A node with the new offsets of its children, and the offset of the node in the input file.
+// A node or brick of a level: its row (result_rows.h) with the offsets of its children in the
+// output file, and its own word offset in the input file.
 struct OldRow {
   Row row;
   uint64_t offset = 0;
   friend bool operator<(const OldRow& a, const OldRow& b) { return compare_rows(a.row, b.row) < 0; }
 };
 
-// The new place of a node, and the offset of the node in the input file.
+// The position of a node in the output file, and its word offset in the input file.
 struct PlacedNode {
   uint64_t offset = 0;
   NewNode node;
@@ -27,8 +28,8 @@ struct PlacedNode {
 
 using NewNodes = NodeValues<NewNode>;
 
-// Adds the rows of a level to `rows`. `below` has the new nodes of the next finer level; it is null
-// for bricks.
+// Makes the rows of all nodes of a level. `below` has the new positions and the hashes of the nodes
+// on the next finer level; it is null if the level has bricks.
 class RowMaker {
  public:
   RowMaker(DagInput& input, uint32_t level, const NewNodes* below, const SpillSpace& space,
@@ -76,7 +77,8 @@ class RowMaker {
   std::optional<NodeLookups<NewNodes>> lookups_;
 };
 
-// Writes the rows in their order. Returns the number of words.
+// Sorts the rows and writes them as a level. Adds the new position of each node to `placed`.
+// Returns the number of words of the level.
 uint64_t write_rows(DagInput& input, uint32_t level, SpillSorter<OldRow>& rows, bool is_wide,
                     GlobalFileWriter& out, MemoryBudget& budget, SpillSorter<PlacedNode>& placed) {
   rows.finish();

@@ -1,5 +1,6 @@
-// Writes the levels of a file in the total order by hash (docs/format.md), from the bricks up to
-// the root. The rows of each level are sorted on the disk if they do not fit in memory.
+// Writes the levels of a file in the total order by hash (docs/format.md, "Node order"), from the
+// bricks up to the root. The order of a level depends on the new offsets of the children, so the
+// finer level is always written first. Rows that do not fit in memory are sorted on the disk.
 #pragma once
 
 #include "core/base/progress.h"
@@ -9,14 +10,14 @@
 
 namespace voxdag::query {
 
-// Memory for the new offsets of a level.
+// Memory limits for the new offsets of the nodes of one level.
 struct OffsetMemory {
-  uint64_t value_bytes = 0;   // maximum memory of the offsets of a level
-  uint64_t window_bytes = 0;  // memory of a window of lookups (node_values.h)
+  uint64_t value_bytes = 0;   // up to this size, all offsets are in memory
+  uint64_t window_bytes = 0;  // otherwise, memory of a window of lookups (node_values.h)
 };
 
-// Writes all levels. Requires that the file has voxels. Throws Error{kCorrupt} if a pointer does
-// not refer to a node, or if two nodes of a level are equal.
+// Writes all levels of `input` to `out`. The file must have voxels. Throws Error{kCorrupt} if a
+// child pointer does not refer to a node, or if two nodes of a level are equal.
 void write_levels_by_hash(DagInput& input, const SpillSpace& space, const OffsetMemory& memory,
                           GlobalFileWriter& out, Progress& progress);
 

@@ -15,22 +15,23 @@ namespace {
 constexpr uint64_t kNodesBetweenChecks = 4096;
 constexpr uint64_t kMaxNodeWords = global_layout::kMaxNodeWords;
 
-// A pointer: the word offset of its target in the input file. Pointers of a level are numbered in
-// the order in which they are written.
+// A child pointer of the level that is being written. `target` is the word offset of the child in
+// the input file. `number` counts the pointers of the level in the order of the output file.
 struct Pointer {
   uint64_t target = 0;
   uint64_t number = 0;
   friend auto operator<=>(const Pointer&, const Pointer&) = default;
 };
 
-// A pointer, and the number of the first pointer to the same target.
+// The pointer `number`. `first` is the number of the first pointer to the same child.
 struct PointerUse {
   uint64_t first = 0;
   uint64_t number = 0;
   friend auto operator<=>(const PointerUse&, const PointerUse&) = default;
 };
 
-// A node of the next level, with the number of the first pointer to it.
+// A node of the next level, with its words from the input file. `first` is the number of the first
+// pointer to it.
 struct MetNode {
   uint64_t first = 0;
   uint32_t count = 0;
@@ -38,14 +39,16 @@ struct MetNode {
   friend bool operator<(const MetNode& a, const MetNode& b) { return a.first < b.first; }
 };
 
-// A pointer of the new file.
+// The new value of the pointer `number`: the offset of the child in the output file.
 struct NewPointer {
   uint64_t number = 0;
   uint64_t offset = 0;
   friend auto operator<=>(const NewPointer&, const NewPointer&) = default;
 };
 
-// A node in a queue. The words after it are probably pointers of nodes that follow soon.
+// A node that visit() reads from a queue. `words_ahead` are words of the queue some distance after
+// the node. Most of them are child pointers of nodes that are visited soon, so the caller can
+// prefetch their targets.
 struct QueuedNode {
   uint32_t mask;
   int children;
@@ -56,7 +59,7 @@ struct QueuedNode {
   uint64_t pointer(int i) const { return voxdag_reader::Node{mask, pointers, is_wide}.child(i); }
 };
 
-// Writes the words of a level in order.
+// Writes the nodes of a level to the output file, one after the other.
 class LevelOutput {
  public:
   LevelOutput(GlobalFileWriter& out, uint32_t level, bool is_wide, MemoryBudget& budget)
@@ -90,7 +93,8 @@ class LevelOutput {
   uint64_t written_ = 0;  // words in the file
 };
 
-// Sorts the pointers by their targets. Adds each target to `met` and each pointer to `uses`.
+// Sorts `pointers`, which point to nodes of `level`, by their targets, and finds the first pointer
+// to each target. Adds each node that is a target to `met`, and each pointer to `uses`.
 void find_first_pointers(DagInput& input, uint32_t level, SpillSorter<Pointer>& pointers,
                          SpillSorter<MetNode>& met, SpillSorter<PointerUse>& uses) {
   pointers.finish();
@@ -123,7 +127,7 @@ bool FirstParentOrder::is_wide(uint32_t level) const {
   return input_.level(level + 1).pointer_bits == 64;
 }
 
-// Calls visit_node(node) for each node of the queue.
+// Calls visit_node(QueuedNode) for each node of the queue, in order. All nodes are on `level`.
 template <class Visit>
 void FirstParentOrder::visit(uint32_t level, const WordQueue& nodes, const Visit& visit_node) {
   constexpr uint64_t kWordsAhead = 512;

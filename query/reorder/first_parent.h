@@ -1,14 +1,17 @@
-// Writes the levels of a file in the order by first parent, from the root down to the bricks.
+// Writes the levels of a file in the order by first parent (docs/format.md, "Node order"), from the
+// root down to the bricks.
 //
-// A level is first a queue: its nodes in the new order, with the pointers of the input file. A pass
-// over the queue replaces each pointer by the new offset of its node, and writes the level. A node
-// of the next level that is met for the first time is placed: it becomes the last node of the next
-// level's queue. The next level is either in memory during the pass (forwarded_level.h), or if it
-// does not fit, the pointers are sorted on the disk:
+// Each level has a queue: its nodes in the order of the output file, but with the child pointers of
+// the input file. A pass over the queue of a level does two things. It writes the level with new
+// pointers. And it adds each child that it meets for the first time to the queue of the next level,
+// which gives the child its new offset.
 //
-//   1. by their targets, which gives the first pointer to each target;
-//   2. the targets by their first pointers, which is their new order and gives their new offsets;
-//   3. by their places, which gives the new pointers in the order in which they are written.
+// If the nodes of the next level fit in memory, they are read directly (forwarded_level.h).
+// Otherwise, the child pointers are sorted three times on the disk:
+//
+//   1. by child, to find the first pointer to each child;
+//   2. the children by their first pointers, which gives their order and so their new offsets;
+//   3. the pointers by their position in the output file, in which they are written.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +27,8 @@ namespace voxdag::query {
 
 class FirstParentOrder {
  public:
-  // A level is in memory if it takes at most `level_bytes`. `space` is for the sorted pointers.
+  // All arguments must outlive this object. A level is kept in memory if it needs at most
+  // `level_bytes`. Otherwise, its pointers are sorted in `space`.
   FirstParentOrder(DagInput& input, const SpillSpace& space, uint64_t level_bytes,
                    GlobalFileWriter& out, Progress& progress, const CancelToken& cancel)
       : input_(input),
@@ -34,19 +38,19 @@ class FirstParentOrder {
         progress_(progress),
         cancel_(cancel) {}
 
-  // Writes all levels. Requires that the file has voxels. Throws Error{kCorrupt} if a pointer does
-  // not refer to a node, or if nodes cannot be reached from the root.
+  // Writes all levels. The file must have voxels. Throws Error{kCorrupt} if a child pointer does
+  // not refer to a node, or if a node has no parent.
   void write_levels();
 
  private:
-  // Returns the queue of the level after the level of `nodes`, and writes the level of `nodes`.
+  // Write `level`, whose queue is `nodes`. Return the queue of the next level.
   std::unique_ptr<WordQueue> write_in_memory(uint32_t level, const WordQueue& nodes);
   std::unique_ptr<WordQueue> write_by_sorting(uint32_t level, const WordQueue& nodes);
   void write_bricks(const WordQueue& bricks);
-  bool is_wide(uint32_t level) const;  // true if pointers in the level have 64 bits
+  bool is_wide(uint32_t level) const;  // true if the nodes of `level` have 64-bit pointers
   template <class Visit>
   void visit(uint32_t level, const WordQueue& nodes, const Visit& visit_node);
-  // Adds a node to the queue of `level`, and returns its new offset.
+  // Adds a node of `level` to `queue`, the queue of this level. Returns the new offset of the node.
   uint64_t place(uint32_t level, std::span<const uint32_t> words, WordQueue& queue) const;
 
   DagInput& input_;

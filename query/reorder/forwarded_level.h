@@ -1,11 +1,11 @@
-// A copy of a level in memory, in which nodes are replaced by their new offsets once these are
-// known:
+// A copy of a level in memory that stores the new offsets of its nodes. A node is placed when it
+// gets its new offset. The new offset then overwrites the first two words of the node:
 //
-//   node, not placed:  its words; the first word is the child mask, 1 to 255
-//   node, placed:      [0x100 | bits 32 to 47 of the new offset, from bit 16 on] [low 32 bits]
-//   brick, placed:     [high half of the new offset] [low half], and its bit in placed_bricks_
+//     node, not placed:  its words; the first word is the child mask, 1 to 255
+//     node, placed:      [0x100 | bits 32 to 47 of the new offset << 16] [low 32 bits]
+//     brick, placed:     [high 32 bits] [low 32 bits], and its bit in placed_bricks_ is 1
 //
-// So a lookup of a node that is already placed reads one word in memory.
+// So a lookup needs no second table for nodes, and reads memory at only one place.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ namespace voxdag::query {
 
 class ForwardedLevel {
  public:
-  // Returns the memory of a ForwardedLevel.
+  // Returns the memory that a ForwardedLevel of this level needs.
   static uint64_t bytes_of(const voxdag_reader::Level& level) {
     return sizeof(uint32_t) * level.word_count + sizeof(uint64_t) * (level.word_count / 128 + 1);
   }
@@ -42,8 +42,9 @@ class ForwardedLevel {
   void prefetch(uint64_t offset) const {
     if (offset < words_.size()) __builtin_prefetch(words_.data() + offset);
   }
-  // Returns the new offset of the node or brick at word `offset`. If it is not placed yet, calls
-  // place(words), which returns its new offset. All new offsets must be less than 2^40.
+  // Returns the new offset of the node or brick that begins at word `offset` of the input file. If
+  // it is not placed yet, calls place(words), and stores the new offset that place() returns. New
+  // offsets must be less than 2^48; levels have at most 2^40 words.
   template <class Place>
   uint64_t find(uint64_t offset, const Place& place) {
     if (offset + 1 >= words_.size()) no_node(offset);
@@ -85,7 +86,7 @@ class ForwardedLevel {
   const bool is_brick_level_;
   const bool is_wide_;
   PageBuffer<uint32_t> words_;
-  PageBuffer<uint64_t> placed_bricks_;  // one bit for each brick
+  PageBuffer<uint64_t> placed_bricks_;  // one bit for each brick: 1 if it is placed
 };
 
 }  // namespace voxdag::query

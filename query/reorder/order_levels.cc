@@ -12,13 +12,13 @@
 namespace voxdag::query {
 namespace {
 
-// Divisors of the memory limit. They give the memory of one list, one sorter, the new offsets of a
-// level, one window of lookups, and a level in memory. There are up to three sorters at any time.
+// Divisors of the memory limit, for the memory of one list, of one sorter, of the new offsets of a
+// level, and of one window of lookups (node_values.h). Up to three sorters exist at the same time.
 constexpr uint64_t kListShare = 1024;
 constexpr uint64_t kSorterShare = 8;
 constexpr uint64_t kValueShare = 4;
 constexpr uint64_t kWindowShare = 16;
-constexpr uint64_t kLevelShareOf8 = 6;  // eighths
+constexpr uint64_t kLevelShareOf8 = 6;  // eighths of the limit, for a level in memory
 constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
 
 void refuse_unknown(const voxdag_reader::File& file, const GlobalFileWriter& out) {
@@ -55,7 +55,8 @@ void order_levels(const voxdag_reader::File& file, NodeOrder order, const OrderS
   const SpillSpace spill{space.folder, space.budget, share(kListShare), share(kSorterShare),
                          std::min(space.list_bytes, kListBufferBytes)};
   const uint64_t level_bytes = std::min(space.memory_bytes / 8 * kLevelShareOf8, space.list_bytes);
-  // The limit leaves room for the pages that are loaded between two checks.
+  // DagInput releases pages of the file only at intervals, so its limit is lower than the limit of
+  // the process.
   DagInput input(file, space.memory_bytes / 8 * 7, cancel);
   progress.begin_stage("reorder", file.dag_nodes(), "nodes");
   with_reader_errors([&] {

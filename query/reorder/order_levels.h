@@ -16,18 +16,18 @@
 
 namespace voxdag::query {
 
-// The memory for order_levels(), and the folder for data that does not fit in this memory.
+// The memory for order_levels(), and the folder for data that does not fit in memory.
 struct OrderSpace {
   ScratchFolder& folder;
   MemoryBudget& budget;
-  uint64_t memory_bytes = 0;  // limit of the process's resident memory
-  // Additional limit for the memory of each list and of each level. Tests set a small limit.
+  uint64_t memory_bytes = 0;  // limit for the resident memory of the process
+  // Additional limit for the memory of each list and of each level. Tests use a small limit.
   uint64_t list_bytes = ~uint64_t{0};
 };
 
-// Writes the levels of `file`, whose nodes may be in any known order, to `out`, a new file with the
-// same grid. Throws Error{kUnsupportedVersion} for an order that is not known, Error{kCorrupt} for
-// a damaged file, and the errors of OrderSpace's folder.
+// Writes the levels of `file` in the given order to `out`, a new file with the same grid. The nodes
+// of `file` may be in any order that this program knows. Throws Error{kUnsupportedVersion} for
+// another order, Error{kCorrupt} for a damaged file, and the errors of OrderSpace::folder.
 void order_levels(const voxdag_reader::File& file, NodeOrder order, const OrderSpace& space,
                   GlobalFileWriter& out, Progress& progress, const CancelToken& cancel);
 

@@ -20,7 +20,7 @@ using namespace global_layout;
 
 constexpr uint64_t kCopyBytes = uint64_t{1} << 20;
 
-// Appends the attribute sections of `file` to `out`, byte for byte.
+// Copies the attribute sections of `file` to `out`, byte for byte. `input` reads the same file.
 void copy_sections(const voxdag_reader::File& file, DagInput& input, GlobalFileWriter& out) {
   const auto get = [&](size_t at, auto& value) {
     std::memcpy(&value, file.data() + at, sizeof(value));

@@ -1,4 +1,5 @@
-// A scratch file of words that are first all written and then all read, both in order.
+// A queue of words in a scratch file. All words are written first, and then all are read in the
+// same order.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +26,8 @@ class WordQueue {
     std::ranges::copy(words, buffer_.data() + count_);
     count_ += words.size();
   }
-  // Completes the queue. Must be called after the last word was added.
+  // Writes the remaining words to the file. Must be called after the last add() and before the
+  // queue is read.
   void finish() {
     flush();
     buffer_ = {};
@@ -45,15 +47,15 @@ class WordQueue {
   uint64_t written_ = 0;  // words in the file
 };
 
-// Reads a finished queue, which must outlive the reader, from its beginning.
+// Reads a queue from its beginning. The queue must be finished and outlive the reader.
 class WordQueueReader {
  public:
   WordQueueReader(const WordQueue& queue, MemoryBudget& budget)
       : queue_(queue), buffer_(budget, 2 * kQueueBufferWords, "a queue of nodes") {}
 
   bool at_end() const { return at_ == count_ && loaded_ == queue_.words(); }
-  // Returns the next words without moving: `count` words, or fewer at the end of the queue. `count`
-  // must be at most kQueueBufferWords.
+  // Returns the next words: `count` words, or fewer at the end of the queue. skip() moves past
+  // them. `count` must be at most kQueueBufferWords. The result is valid until the next call.
   std::span<const uint32_t> peek(uint64_t count) {
     if (count_ - at_ < count && loaded_ < queue_.words()) load();
     return {buffer_.data() + at_, std::min(count, count_ - at_)};
@@ -75,7 +77,7 @@ class WordQueueReader {
   PageBuffer<uint32_t> buffer_;
   uint64_t at_ = 0;      // position in the buffer
   uint64_t count_ = 0;   // words in the buffer
-  uint64_t loaded_ = 0;  // words read from the file
+  uint64_t loaded_ = 0;  // words of the file that were read into the buffer
 };
 
 }  // namespace voxdag::query

@@ -1,5 +1,6 @@
-// Cubes of a file's empty voxels around one voxel, to check a solid whose walks are made by a cube
-// of radius + 1 voxels per edge (docs/solid.md, "Enclosed"). Voxels outside the grid are empty.
+// Finds the cubes of radius + 1 voxels per edge near one voxel, the center, whose voxels are all
+// empty. A check of enclosed solids uses them: such a cube makes the walks of docs/solid.md,
+// "Enclosed". Voxels outside the grid are empty.
 #pragma once
 
 #include <array>
@@ -14,25 +15,27 @@ using VoxelPlace = std::array<int64_t, 3>;
 
 class EmptyCubes {
  public:
-  // Reads the voxels up to radius + 1 away from `center`. `edge` is the edge of the grid.
+  // Reads a block of voxels from the file: all voxels whose distance from `center` is at most
+  // radius + 1 along each axis. `edge` is the number of voxels per edge of the grid.
   EmptyCubes(const voxdag_reader::File& file, int64_t edge, const VoxelPlace& center, int radius);
 
-  // True if an empty cube has the center.
+  // True if an empty cube contains the center.
   bool has_center() const;
 
-  // The cubes that have the center's neighbor and not the center, and that one step along the axis
-  // would move over the center.
+  // A step of all empty cubes that touch one side of the center. Each of them would contain the
+  // center after a move by one voxel along an axis.
   struct Step {
     bool has_cubes = false;
-    std::vector<VoxelPlace> stops;  // set voxels, one of which can stop an empty cube
+    std::vector<VoxelPlace> stops;  // set voxels that at least one of the cubes would move over
   };
-  // Returns the step from the neighbor at center + side along the axis. `side` is 1 or -1.
+  // Returns the step of the cubes on one side of the center: with higher coordinates along `axis`
+  // if `side` is 1, with lower ones if it is -1.
   Step step_from(int axis, int side) const;
 
  private:
-  // Returns the number of set voxels in [low, high), in places of the block that was read.
+  // Returns the number of set voxels in [low, high). Positions are in sums_.
   int count(const std::array<int, 3>& low, const std::array<int, 3>& high) const;
-  // True if the cube whose lowest voxel is at `low` in the block is empty.
+  // True if the cube of radius + 1 voxels per edge with the low corner `low` has no set voxel.
   bool is_empty(const std::array<int, 3>& low) const;
   int& sum(int x, int y, int z) {
     return sums_[(static_cast<size_t>(x) * side_ + static_cast<size_t>(y)) * side_ +
@@ -42,8 +45,8 @@ class EmptyCubes {
 
   const VoxelPlace center_;
   const int radius_;
-  const size_t side_;      // of sums_: one more than the block's edge
-  std::vector<int> sums_;  // numbers of set voxels below a place along all axes
+  const size_t side_;      // edge of sums_: the edge of the block, plus 1
+  std::vector<int> sums_;  // by position: number of set voxels with lower coordinates on all axes
 };
 
 }  // namespace voxdag::query

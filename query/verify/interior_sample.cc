@@ -84,8 +84,8 @@ bool is_closed(SolidRule rule, const SampledVoxel& voxel) {
                                     : " is set, but it is outside the scene's surface"));
 }
 
-// Calls add_triangle() for the triangles of the scene. Returns false if a triangle was left out
-// because a coordinate was too large.
+// Calls add_triangle() for each triangle of the scene, in integer coordinates. Leaves out triangles
+// with a coordinate that is too large for them. Returns false if it has left out a triangle.
 template <class Add>
 bool add_scene(TriangleSource& scene, const Grid& grid, Progress& progress,
                const CancelToken& cancel, const Add& add_triangle) {
@@ -109,7 +109,7 @@ bool add_scene(TriangleSource& scene, const Grid& grid, Progress& progress,
   return is_complete;
 }
 
-// True if the voxel's neighbors are set, and all of them are in the grid.
+// True if all six neighbors of the voxel are in the grid and set.
 bool is_surrounded(const voxdag_reader::File& file, const VoxelPlace& at, int64_t edge) {
   for (size_t a = 0; a < 3; ++a)
     for (const int64_t step : {-1, 1}) {
@@ -125,12 +125,13 @@ VoxelPlace place_of(const SampledVoxel& voxel) {
           voxel.low[2] / kUnitsPerVoxel};
 }
 
-// A step of empty cubes toward a sampled voxel. A triangle must touch one of the voxels in `stops`
-// unless it touches the sampled voxel.
+// A step of empty cubes onto a sampled voxel that is set (EmptyCubes::Step). The solid is right
+// only if a triangle touches at least one of the voxels in `stops`, which include the sampled
+// voxel.
 struct SampledStep {
   size_t sample;  // index of the sampled voxel
   std::vector<VoxelPlace> stops;
-  VoxelPlace low, high;  // the bounds of `stops`, in lattice units
+  VoxelPlace low, high;  // bounding box of `stops`, in lattice units
   bool is_stopped = false;
 };
 
@@ -159,8 +160,9 @@ void add(const FixedTriangle& t, SampledStep& step) {
   }
 }
 
-// Returns the steps of empty cubes toward the sampled voxels that are set. Throws Error{kCorrupt}
-// for an empty voxel that is in no empty cube.
+// Returns the possible steps of empty cubes onto those sampled voxels that are set. For each
+// sampled voxel that is not set, checks that an empty cube contains it; otherwise throws
+// Error{kCorrupt}.
 std::vector<SampledStep> sample_steps(const voxdag_reader::File& file, const Grid& grid,
                                       const std::vector<SampledVoxel>& voxels, uint32_t radius) {
   std::vector<SampledStep> steps;

@@ -7,13 +7,14 @@
 // no triangle touches. If the signs on a row do not add up to 0, the surface is not closed. A build
 // then decides voxels by majorities of rows, so only voxels that triangles touch are compared.
 //
-// The voxels of an enclosed solid are compared with their neighbors in the file instead:
+// The voxels of an enclosed solid are compared with their neighbors in the file instead. A cube of
+// radius + 1 voxels per edge makes the walks (docs/solid.md, "Enclosed"). Voxels outside the grid
+// are empty.
 //
-//   - An empty voxel is in an empty cube of radius + 1 voxels per edge.
-//   - If a set voxel that no triangle touches has an empty neighbor, a triangle touches a voxel
-//   that
-//     stops an empty cube on its way from the neighbor to the voxel. So without a radius, a set
-//     voxel that no triangle touches has no empty neighbor. Voxels outside the grid are empty.
+// - A voxel that is not set must be in an empty cube, because the walks have reached it.
+// - A set voxel may be next to an empty cube, which would contain the voxel after one step. Then
+//   something must stop this step: a triangle must touch one of the set voxels that the cube would
+//   move over. Without a radius, this is the voxel itself.
 #pragma once
 
 #include <cstdint>

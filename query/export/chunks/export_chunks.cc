@@ -18,19 +18,19 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr uint64_t kMinChunkEdge = 4;
 
-// A chunk, by its place in the grid of chunks of a level.
+// A chunk: its position in chunks of the same level, and the selected cells in it.
 struct Chunk {
   Position place;
   Selection selection;
 };
 
-// Finds the chunks of one level that have voxels.
+// Finds the chunks of one level that have voxels. `edge` is the edge of a chunk, in cells.
 class ChunkFinder {
  public:
   ChunkFinder(const DagExport& dag, const Selection& selection, uint64_t edge)
       : dag_(dag), selection_(selection), edge_(static_cast<int64_t>(edge)) {}
 
-  // Returns the chunks in Morton order.
+  // Returns the chunks that have voxels, in Morton order.
   std::vector<Chunk> find() {
     const int64_t edge = int64_t{1} << selection_.grid_levels;
     if (!dag_.dag().empty()) visit(0, dag_.dag().root(), {0, 0, 0}, edge);

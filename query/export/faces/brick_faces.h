@@ -1,4 +1,4 @@
-// Faces of the cells of a brick, as masks of the cells that have them.
+// Finds the faces between set and empty cells of a brick. Results are masks with one bit per cell.
 #pragma once
 
 #include <cstdint>
@@ -8,18 +8,19 @@
 
 namespace voxdag::query {
 
-// Returns the mask of the cells next to a side of the brick: its upper side along `axis` if
-// `upward` is true, otherwise its lower side.
+// Returns the mask of the 16 cells at one side of a brick: the side with the highest coordinate
+// along `axis` if `upward` is true, otherwise the side with the lowest.
 constexpr uint64_t side_cells(uint8_t axis, bool upward) { return brick_face(2 * axis + upward); }
 
-// Returns the mask of the brick's cells that have a face on the surface: a face perpendicular to
-// `axis`, on the cell's upper side if `upward` is true, otherwise on its lower side. `neighbor` is
-// the mask of the next brick on that side; it only matters if the brick has side_cells().
+// Returns the mask of the set cells whose next cell along `axis` is empty, so that the face between
+// the two is on the surface. The next cell is above if `upward` is true, otherwise below. `mask`
+// has the set cells of the brick. `neighbor` is the mask of the next brick in this direction; it
+// has no effect if no cell of side_cells() is set in `mask`.
 inline uint64_t faces_of_brick(uint64_t mask, uint64_t neighbor, uint8_t axis, bool upward) {
   const uint64_t(&layer)[kBrickEdge] = kBrickLayers.of[axis];
-  const int near = 4 >> axis, far = 28 >> axis;  // differences between the bit numbers of neighbors
+  const int near = 4 >> axis, far = 28 >> axis;  // bit distances: in an octant, between octants
   const int shift = brick_face_shift(axis);
-  // Bit i of `next` is set if the cell on the other side of cell i's face is set.
+  // Bit i of `next` is 1 if the next cell of cell i is set.
   uint64_t next;
   if (upward)
     next = (mask >> near & (layer[0] | layer[2])) | (mask >> far & layer[1]) |

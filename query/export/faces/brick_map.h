@@ -1,5 +1,5 @@
-// The bricks of a selection in Morton order, in which the neighbors of a brick can be found.
-// Immutable after all bricks and cubes were added.
+// The bricks of a selection in Morton order. Finds the neighbors of each brick. Immutable once all
+// bricks and cubes were added.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@ struct BrickMask {
   uint64_t mask = 0;
 };
 
-// A cube of at least 8 cells per edge in which all cells are set.
+// A cube of at least 8 cells per edge whose cells are all set. Its bricks are not added separately.
 struct FullCube {
   uint64_t morton = 0;  // Morton code of the low corner, in bricks
   int64_t edge = 0;     // in cells
@@ -32,22 +32,23 @@ class BrickMap {
     bricks_.reserve(bricks);
     cubes_.reserve(cubes);
   }
-  // Call the following two functions in Morton order.
+  // Bricks must be added in Morton order, and so must full cubes.
   void add(const BrickMask& brick) { bricks_.push_back(brick); }
   void add(const FullCube& cube) { cubes_.push_back(cube); }
   const std::vector<BrickMask>& bricks() const { return bricks_; }
   const std::vector<FullCube>& cubes() const { return cubes_; }
 
-  // Returns the Morton code of the next brick along an axis. The result for a brick at the end of
-  // the grid is no brick's code.
+  // Returns the Morton code of the next brick along an axis, above if `upward` is true, otherwise
+  // below. If the brick is at the border of the grid, the result is a code outside the grid.
   static uint64_t next_morton(uint64_t morton, uint8_t axis, bool upward) {
     const uint64_t bits = uint64_t{0x1249249249249249} << (2 - axis);
     const uint64_t next = upward ? (morton | ~bits) + 1 : (morton & bits) - 1;
     return (next & bits) | (morton & ~bits);
   }
 
-  // Returns the mask of the brick with this Morton code; 0 if no cell of the brick is set. `from`
-  // and `upward` as in find_brick().
+  // Returns the mask of the brick with this Morton code; 0 if the brick has no set cells. The
+  // search begins at the index `from` in bricks() and goes in the direction `upward`
+  // (find_brick()).
   uint64_t mask_at(uint64_t morton, size_t from, bool upward) const {
     const auto found = find_brick(morton, from, upward);
     if (found != bricks_.end() && found->morton == morton) return found->mask;
@@ -58,9 +59,9 @@ class BrickMap {
   }
 
  private:
-  // Returns the first brick with this Morton code or a larger one. Searches from `from` toward
-  // larger codes if `upward` is true, otherwise toward smaller codes. Neighbors in Morton order are
-  // often near, so the step begins with 1 and doubles.
+  // Returns the first brick whose Morton code is at least `morton`. The search begins at the index
+  // `from` and goes to larger codes if `upward` is true, otherwise to smaller codes. The next brick
+  // along an axis is often close to `from` in Morton order, so the steps begin with 1 and double.
   std::vector<BrickMask>::const_iterator find_brick(uint64_t morton, size_t from,
                                                     bool upward) const {
     size_t low = from, high = from, step = 1;

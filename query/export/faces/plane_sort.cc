@@ -7,21 +7,22 @@
 namespace voxdag::query {
 namespace {
 
-// std::sort is faster for fewer faces.
+// For fewer faces than this, std::sort is faster than the radix sort.
 constexpr size_t kFewFaces = 1024;
 constexpr int kFaceDigitBits = 11;
 
 struct FaceDigit {
   int shift, bits;
 };
-// The digits of a face within its plane, lowest first: two of u and two of v.
+// The digits for the radix sort of the faces of one plane, lowest first: two for u and two for v.
 constexpr std::array<FaceDigit, 4> kFaceDigits = {
     {{0, kFaceDigitBits},
      {kFaceDigitBits, kFaceCoordinateBits - kFaceDigitBits},
      {kFaceCoordinateBits, kFaceDigitBits},
      {kFaceCoordinateBits + kFaceDigitBits, kFaceCoordinateBits - kFaceDigitBits}}};
 
-// Copies the faces to `to` in the order of one digit. Faces with equal digits keep their order.
+// One pass of the radix sort: copies `from` to `to`, ordered by one digit. Faces with equal digits
+// keep their order.
 void sort_faces_by_digit(std::span<const uint64_t> from, std::span<uint64_t> to, FaceDigit digit) {
   const auto of = [digit](uint64_t face) {
     return face >> digit.shift & ((uint64_t{1} << digit.bits) - 1);

@@ -1,5 +1,6 @@
-// Turns of the axes by 90 degrees around x, for exports in which another axis points up. A turn
-// maps the cube of the grid to itself, so it maps octree cubes to octree cubes.
+// Rotations of a grid by 90 degrees around the x axis, for exports in which another axis points up.
+// A rotation maps the grid to itself and octree cubes to octree cubes, so the levels of a DAG keep
+// their numbers of nodes.
 #pragma once
 
 #include <array>
@@ -10,13 +11,15 @@
 
 namespace voxdag::query {
 
-// Axis a of the turned grid is axis from[a] of the file's grid, reversed if reversed[a] is true.
+// A rotation. Axis a of the turned grid is axis from[a] of the file's grid. If reversed[a] is true,
+// its direction is reversed.
 struct AxisTurn {
   std::array<uint8_t, 3> from = {0, 1, 2};
   std::array<bool, 3> reversed = {};
 
   bool is_none() const { return from[1] == 1; }
-  // Converts a cell of a grid with `edge` cells per edge from the file's axes to the turned axes.
+  // Converts a cell from the file's axes to the turned axes. `edge` is the number of cells per edge
+  // of the grid.
   Position turned(const Position& cell, int64_t edge) const {
     Position result;
     for (size_t a = 0; a < 3; ++a)
@@ -45,16 +48,17 @@ struct AxisTurn {
     }
     return result;
   }
-  // Returns the index of a child (4x + 2y + z) after the turn.
+  // Returns the index that a child of a node has after the rotation. The child at (x, y, z) has the
+  // index 4x + 2y + z.
   int turned_child(int child) const {
     const Position at = turned(Position{child >> 2, child >> 1 & 1, child & 1}, 2);
     return static_cast<int>(4 * at[0] + 2 * at[1] + at[2]);
   }
 };
 
-// Maps (x, y, z) to (x, -z, y): the y axis of the file points along z.
+// Maps (x, y, z) to (x, -z, y). The y axis of the file then points along z.
 constexpr AxisTurn kTurnYToZ = {{0, 2, 1}, {false, true, false}};
-// Maps (x, y, z) to (x, z, -y).
+// Maps (x, y, z) to (x, z, -y). The z axis of the file then points along y.
 constexpr AxisTurn kTurnZToY = {{0, 2, 1}, {false, false, true}};
 
 }  // namespace voxdag::query

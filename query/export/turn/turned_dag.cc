@@ -6,7 +6,7 @@
 namespace voxdag::query {
 namespace {
 
-using ChildOrder = std::array<int, 8>;  // index of each child after the turn
+using ChildOrder = std::array<int, 8>;  // by index of a child: its index after the turn
 
 ChildOrder child_order(const AxisTurn& turn) {
   ChildOrder order{};
@@ -20,7 +20,8 @@ uint32_t turned_mask(uint32_t mask, const ChildOrder& order) {
   return turned;
 }
 
-// Copies the levels of a DAG and turns their nodes.
+// Copies the levels of a DAG, with the children of each node and the voxels of each brick in the
+// order after the turn.
 class NodeTurner {
  public:
   NodeTurner(const DagView& dag, const AxisTurn& turn, const CancelToken& cancel)
@@ -64,7 +65,8 @@ class NodeTurner {
   size_t at_turned(int child) const {
     return static_cast<size_t>(order_[static_cast<size_t>(child)]);
   }
-  // The octants of a brick, and the voxels of an octant, have the order of a node's children.
+  // A brick has 8 octants of 8 voxels. Both the octants in the brick and the voxels in an octant
+  // are ordered like the children of a node, so the same permutation applies to both.
   uint64_t turned_brick(uint64_t mask) const {
     uint64_t turned = 0;
     for (int i = 0; i < 8; ++i) turned |= uint64_t{masks_[mask >> 8 * i & 255]} << 8 * at_turned(i);

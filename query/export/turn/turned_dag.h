@@ -1,6 +1,6 @@
-// A copy of a DAG with turned axes. A turn permutes the children of each node and the voxels of
-// each brick. Nodes keep their sizes, so the copy has the same word offsets as the original, and
-// all numbers of nodes and words remain valid.
+// A copy of a DAG with turned axes (axis_turn.h). The turn permutes the children of each node and
+// the voxels of each brick. All nodes keep their sizes and their word offsets, so offsets into the
+// original DAG are also valid in the copy.
 #pragma once
 
 #include <vector>
@@ -15,8 +15,8 @@ namespace voxdag::query {
 
 class TurnedDag {
  public:
-  // `path` names the file in errors. Throws Error{kOutOfMemory} if the copy does not fit in the
-  // budget, and Error{kCorrupt} for words that are not a node. The DAG must not be empty.
+  // `dag` must not be empty. `path` is the name of the file in messages. Throws Error{kOutOfMemory}
+  // if the copy does not fit in the budget, and Error{kCorrupt} if words of a level are not nodes.
   TurnedDag(const DagView& dag, const AxisTurn& turn, const std::string& path, MemoryBudget& budget,
             const CancelToken& cancel);
   const DagView& view() const { return view_; }

@@ -1,4 +1,4 @@
-// A stream buffer through which the library OpenVDB writes to an ExportFile.
+// Lets the OpenVDB library write to an ExportFile.
 #pragma once
 
 #include <algorithm>
@@ -11,14 +11,15 @@
 
 namespace voxdag::query {
 
-// A stream buffer that writes to an ExportFile. Streams swallow exceptions, and the libraries' own
-// errors do not contain the reason. So check() rethrows the first exception.
+// A stream buffer that writes to an ExportFile. A C++ stream catches the exceptions of its buffer
+// and only sets a flag, and the error that the library then reports does not contain the reason. So
+// the buffer keeps the first exception, and check() rethrows it.
 class FileBuffer : public std::streambuf {
  public:
-  // `total_bytes` is the total of the stage, an estimate of the bytes that will be written.
+  // `total_bytes` is an estimate of the bytes that will be written. The stage must have this total.
   FileBuffer(ExportFile& file, ExportStage& stage, uint64_t total_bytes)
       : file_(file), stage_(stage), left_bytes_(total_bytes) {}
-  // Completes the progress, whose total was an estimate.
+  // Advances the stage to its total, in case that fewer bytes were written than estimated.
   void finish() { advance(left_bytes_); }
   void check() const {
     if (failure_) std::rethrow_exception(failure_);
@@ -26,8 +27,8 @@ class FileBuffer : public std::streambuf {
 
  protected:
   std::streamsize xsputn(const char* bytes, std::streamsize count) override {
-    // Writes in pieces, to check for cancellation and report progress: a single call may pass a
-    // complete grid.
+    // A single call may pass a complete grid. Writes it in pieces, and checks for cancellation and
+    // reports progress after each.
     constexpr size_t kPieceBytes = 1 << 20;
     const bool done = attempt([&] {
       std::string_view rest(bytes, static_cast<size_t>(count));
@@ -58,7 +59,7 @@ class FileBuffer : public std::streambuf {
   }
 
  private:
-  // Advances the stage, but not beyond its total.
+  // Advances the stage, at most to its total.
   void advance(uint64_t bytes) {
     bytes = std::min(bytes, left_bytes_);
     left_bytes_ -= bytes;

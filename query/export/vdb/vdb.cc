@@ -1,11 +1,11 @@
-// Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. The file has a grid of
-// voxels and, if the input has colors, a grid of the colors in linear light. The grid of voxels is
-// a fog volume with the name "density", which Houdini and Blender render, or a mask. The color grid
-// has the name "Cd", which both programs use. The libraries build the grids completely in
-// memory, so their size is calculated first and compared with the memory budget.
+// Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. A file has a grid of the
+// voxels, which is either a fog volume or a mask. If the input has colors, the file also has a grid
+// of the colors in linear light. The fog volume has the name "density", which Houdini and Blender
+// render. The color grid has the name "Cd", which both programs use. The libraries build all grids
+// in memory, so the memory is calculated first and compared with the memory budget.
 //
-// Half floats are converted without Imath's lookup table, because a use of the table would require
-// linking Imath.
+// Half floats are converted without Imath's lookup table, because the table would require linking
+// to Imath.
 #define IMATH_HALF_NO_LOOKUP_TABLE
 #include <openvdb/openvdb.h>
 
@@ -37,11 +37,11 @@ struct VdbNodeBytes {
 };
 constexpr VdbNodeBytes kOpenVdbMaskBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbMaskBytes = {96, 34 << 10, 272 << 10};
-// Sizes for a grid of floats, one for each voxel of a leaf.
+// Sizes for a grid of floats. A leaf stores one float for each of its voxels.
 constexpr VdbNodeBytes kOpenVdbFloatBytes = {2304, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbFloatBytes = {2176, 34 << 10, 272 << 10};
-// Sizes for a grid of colors. A color is three floats. A node stores for each child one color
-// (padded) or a pointer.
+// Sizes for a grid of colors of three floats each. A node above the leaves stores a padded color or
+// a pointer for each child.
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 // Minimum size of a leaf in a .vdb file, which stores the mask twice.
 constexpr uint64_t kVdbLeafBytes = 128;
@@ -49,15 +49,15 @@ constexpr uint64_t kVdbLeafBytes = 128;
 constexpr uint64_t kRootTileBytes = 128;
 constexpr const char* kColorGridName = "Cd";
 
-constexpr uint64_t kHalfBytes = 2;  // a float in a .vdb file
+constexpr uint64_t kHalfBytes = 2;  // size of a half float, as .vdb files store them
 
 using NanoGrid = nanovdb::GridHandle<nanovdb::HostBuffer>;
 
-// A kind of grid for the voxels (--grid).
+// A choice for the grid of the voxels (option --grid), and the functions that make this grid.
 struct VoxelGrid {
   const char* name;
   VdbNodeBytes open_vdb, nano_vdb;
-  uint64_t value_bytes;  // bytes of a voxel's value in a .vdb file, in addition to the masks
+  uint64_t value_bytes;  // bytes per voxel in a leaf of a .vdb file, not counting the masks
   openvdb::GridBase::Ptr (*make)(const ExportJob& job, uint64_t voxels);
   NanoGrid (*make_nano)(const ExportJob& job, uint64_t voxels);
 };
@@ -83,7 +83,7 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
 
 struct VdbSize {
   uint64_t voxels = 0, bytes = 0;
-  uint64_t leaf_voxels = 0;  // voxels that are not in tiles
+  uint64_t leaf_voxels = 0;  // voxels in leaves, not in tiles (full cubes)
 };
 // True if full cubes are tiles of the grid of voxels. A grid of colors has no tiles, because the
 // voxels of a cube have different colors.
@@ -190,7 +190,7 @@ void set_brick(const Brick& brick, const Value& value, Accessor& accessor, Expor
   stage.advance(static_cast<uint64_t>(std::popcount(brick.mask)));
 }
 
-// Returns a grid in which the voxels are active and have the value 1 or true.
+// Returns a grid in which all selected voxels are active and have the value 1 or true.
 template <class GridType>
 typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t voxels, const char* name) {
   const typename GridType::ValueType on(1);
@@ -217,7 +217,7 @@ typename GridType::Ptr make_voxel_grid(const ExportJob& job, uint64_t voxels, co
 openvdb::FloatGrid::Ptr make_density(const ExportJob& job, uint64_t voxels) {
   const auto grid = make_voxel_grid<openvdb::FloatGrid>(job, voxels, "density");
   grid->setGridClass(openvdb::GRID_FOG_VOLUME);
-  grid->setSaveFloatAsHalf(true);  // 0 and 1 are exact
+  grid->setSaveFloatAsHalf(true);  // all values are 0 or 1, which half floats store exactly
   return grid;
 }
 
@@ -242,7 +242,7 @@ constexpr VoxelGrid kVoxelGrids[] = {
      }},
 };
 
-// Returns the grid that the job's option names.
+// Returns the choice of --grid. Throws Error{kInvalidInput} for an unknown name.
 const VoxelGrid& voxel_grid(const ExportJob& job) {
   const std::string& wanted = job.options.grid;
   if (wanted.empty()) return kVoxelGrids[0];
@@ -319,7 +319,8 @@ ExportReport write_vdb(const ExportJob& job) {
     }
     return write_grid_file(job, voxels, std::max<uint64_t>(min_bytes, 1),
                            [&](std::ostream& stream) {
-                             // Does not compress, because some readers may lack the codec.
+                             // Uses no codec, because some readers may lack it.
+                             // COMPRESS_ACTIVE_MASK only leaves out inactive values.
                              openvdb::io::Stream out(stream);
                              out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
                              out.write(grids);
