@@ -44,8 +44,8 @@ FieldJson numbers_schema(const Field& field, size_t count) {
   FieldJson items = FieldJson::array();
   for (size_t i = 0; i < count; ++i) items.push_back({{"type", "number"}});
   if (field.is_above_zero) items.back()["exclusiveMinimum"] = 0;
-  // maxItems excludes further items, so `items` only names the type: generators of clients need it,
-  // and do not accept the schema "false".
+  // maxItems forbids further items, so `items` could be `false`. But generators of client libraries
+  // do not accept this, and need the type of the items.
   return {{"type", "array"},
           {"minItems", count},
           {"maxItems", count},

@@ -75,7 +75,8 @@ struct BuildOptions {
   // For kEnclosed: a point in the units of the scene. If it is set, only the enclosed space around
   // this point is filled.
   std::optional<std::array<double, 3>> seed;
-  // For kEnclosed, without a seed: gaps of up to this many voxels, at most 16, are sealed.
+  // Only for kEnclosed without a seed: the build seals gaps that are up to this many voxels wide.
+  // At most 16.
   uint32_t radius = 0;
   // The attributes to store for each cell of the color grid. `color_resolution` is the number of
   // cells per edge of this grid, a power of two. 0 means the smaller of `resolution` and 4096.

@@ -26,9 +26,10 @@ class PagePool {
   PagePool& operator=(const PagePool&) = delete;
   ~PagePool() { clear(); }
 
-  // Returns the size of a new page range for `bytes`: a power of two up to 4 MiB, and a multiple of
-  // 2 MiB, the size of a huge page, above 4 MiB. The system aligns only such ranges to huge pages,
-  // and can only move them without dividing their huge pages.
+  // Returns the size of a new range of pages that can store `bytes` bytes: the next power of two up
+  // to 4 MiB, and above it the next multiple of 2 MiB, the size of a huge page. Only if the size is
+  // such a multiple does the system align the range to huge pages, and move it without dividing
+  // them.
   static size_t range_bytes(size_t bytes);
   // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes. Returns a range
   // with null data if no range fits.

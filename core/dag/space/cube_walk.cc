@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kNeighbors = 8;
 
-// Numbers of the nodes of a cube and of its neighbors; 0: empty.
+// The nodes of a cube and of its neighbors, in the order of CubeNeighbors, as numbers of
+// NeighborNodes. 0 means that the cube is empty.
 using Neighborhood = std::array<uint32_t, kNeighbors>;
 
 struct FilteredNode {
@@ -26,8 +27,9 @@ struct FilteredNode {
   bool is_used = false;
 };
 
-// The filtered nodes of one depth. If the memory does not suffice for more nodes, forgets all of
-// them, so that they are computed again.
+// Hash table of the results for the neighborhoods of one depth, so that each result is computed
+// once. If there is not enough memory for a larger table, add() empties the table. Removed results
+// are computed again when they are needed.
 class FilteredNodes {
  public:
   const FilteredNode* find(const Neighborhood& key) const {
@@ -66,15 +68,15 @@ class FilteredNodes {
       if (old[i].is_used) slots_[slot_of(old[i].key)] = old[i];
   }
 
-  static constexpr uint64_t kBudgetPart = 4;  // a table takes at most 1/kBudgetPart of the free
-                                              // memory
+  // A table grows only if the new table takes at most 1/kBudgetPart of the available memory.
+  static constexpr uint64_t kBudgetPart = 4;
 
   PooledArray<FilteredNode> slots_;
   uint64_t used_slots_ = 0, count_ = 0;
 };
 
-// The distinct sub-DAGs of a cube and its neighbors. Numbers their nodes at each depth below the
-// cubes, from 1.
+// Numbers the nodes of a cube and its neighbors, which can be in one sub-DAG or in several. All
+// nodes at the same depth below the cubes have distinct numbers, from 1.
 class NeighborNodes {
  public:
   NeighborNodes(const CubeNeighbors& cubes, int depths) {
@@ -94,7 +96,8 @@ class NeighborNodes {
   uint32_t number(const NodePlace& place) const {
     return place.levels == nullptr ? 0 : find(place)->first[0] + place.row;
   }
-  // Writes the numbers of a node's children, or 0 for each octant without a child.
+  // Writes the numbers of a node's children to `out`, by octant. The number of an absent child is
+  // 0.
   void children(int depth, uint32_t node, uint32_t (&out)[8]) const {
     std::fill(std::begin(out), std::end(out), 0);
     if (node == 0) return;
@@ -114,8 +117,8 @@ class NeighborNodes {
  private:
   struct Source {
     const NodeLevels* levels;
-    int top;                      // depth of the cube's node in `levels`
-    std::vector<uint32_t> first;  // by depth below the cube: the number of row 0
+    int top;                      // depth of the cubes' nodes in `levels`
+    std::vector<uint32_t> first;  // by depth below the cubes: number of the node in row 0
   };
   const Source* find(const NodePlace& place) const {
     for (const Source& source : sources_)
@@ -166,7 +169,7 @@ class NeighborFilter {
   }
   int size_log2(int depth) const { return size_log2_ - depth; }
 
-  // True if the result is empty, without a look at the voxels.
+  // True if the result is certainly empty, because the cubes that determine it have no voxels.
   bool is_empty(const Neighborhood& cubes) const {
     if (filter_ == WalkFilter::kEnclosed) return cubes[0] == 0;
     return std::ranges::all_of(cubes, [](uint32_t node) { return node == 0; });
@@ -177,8 +180,9 @@ class NeighborFilter {
     for (size_t n = 0; n < kNeighbors; ++n) nodes_.children(depth, cubes[n], children[n]);
     NodeRef octants[8];
     for (uint32_t o = 0; o < 8; ++o) {
-      // The cube one step away from octant o along the axes in n is an octant of the same cube
-      // along the axes on which the step does not leave the cube.
+      // Neighbor n of octant o is octant o ^ n of a cube. This cube is another one than the
+      // octant's along those axes of n on which the step to the neighbor leaves the octant's cube:
+      // the axes in `leaves & n`.
       const uint32_t leaves = filter_ == WalkFilter::kBlocked ? o : ~o;
       Neighborhood around;
       for (uint32_t n = 0; n < kNeighbors; ++n) around[n] = children[leaves & n][o ^ n];
@@ -187,8 +191,9 @@ class NeighborFilter {
     return tables_.add_node(size_log2(depth), octants);
   }
 
-  // A voxel is enclosed iff none of the positions in x - [0, V]^3 is open. With p = x - V these are
-  // the positions in p + [0, V]^3.
+  // spread() combines the voxels in p + [0, V]^3, where V is the radius. A voxel x is enclosed if
+  // no position in x - [0, V]^3 is open. With p = x - V, these are the positions in p + [0, V]^3.
+  // So the result for x is at x - V: it begins at `low`.
   NodeRef filter_tile(int depth, const Neighborhood& cubes) {
     const int edge = 1 << base_log2_;
     const bool is_blocked = filter_ == WalkFilter::kBlocked;
@@ -205,7 +210,7 @@ class NeighborFilter {
     return take(base_log2_, low, low, low);
   }
 
-  // Puts the voxels of a node at a place in tile_.
+  // Sets the voxels of a node in tile_. The node's low corner is at (x, y, z).
   void put(int depth, uint32_t node, int x, int y, int z) {
     if (node == 0) return;
     if (size_log2(depth) == kBrickLevels)
@@ -216,7 +221,8 @@ class NeighborFilter {
     for (int o = 0; o < 8; ++o)
       put(depth + 1, children[o], x + (o >> 2) * half, y + (o >> 1 & 1) * half, z + (o & 1) * half);
   }
-  // Adds the node of a cube in tile_.
+  // Adds the voxels of a cube in tile_ to tables_, and returns their node. The cube has 2^size
+  // voxels per edge, and its low corner is at (x, y, z).
   NodeRef take(int size, int x, int y, int z) {
     if (size == kBrickLevels) return tables_.add_brick(tile_.brick(x, y, z));
     const int half = 1 << (size - 1);

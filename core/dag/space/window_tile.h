@@ -1,5 +1,5 @@
-// The voxels of a cube and of its neighbors as rows of bits, to combine each voxel with the voxels
-// in a window of V + 1 voxels per edge.
+// A small cube of voxels, stored as rows of bits. spread() combines each voxel with the voxels in a
+// window next to it, a row at a time.
 #pragma once
 
 #include <algorithm>
@@ -43,13 +43,14 @@ class WindowTile {
     return mask;
   }
 
-  // Sets each voxel p that has a set voxel in p + [0, radius]^3. Voxels outside the tile count as
-  // empty.
+  // Sets each voxel p for which p + [0, radius]^3 contains a set voxel. Voxels outside the tile
+  // count as empty.
   void spread(int radius) {
     for (int width = 1; width <= radius;) {
       const int step = std::min(width, radius + 1 - width);
       for (int i = 0; i < edge_ * edge_; ++i) rows_[i] |= rows_[i] >> step;
-      // Rows change in ascending order, so the other row has not changed yet.
+      // The loop changes rows in ascending order, so row y + step has not changed when row y reads
+      // it.
       for (int x = 0; x < edge_; ++x)
         for (int y = 0; y + step < edge_; ++y) row(x, y) |= row(x, y + step);
       for (int i = 0; i + step * edge_ < edge_ * edge_; ++i) rows_[i] |= rows_[i + step * edge_];

@@ -12,11 +12,11 @@
 
 namespace voxdag {
 
-// For bytes that are added in order.
+// Computes the checksums of bytes that are added in order.
 class BlockChecksums {
  public:
   BlockChecksums() = default;
-  // Continues after complete blocks, whose checksums are `whole_blocks`.
+  // Continues after complete blocks with the checksums `whole_blocks`.
   explicit BlockChecksums(std::span<const uint64_t> whole_blocks)
       : checksums_(whole_blocks.begin(), whole_blocks.end()) {}
 
@@ -30,8 +30,9 @@ class BlockChecksums {
   size_t filled_ = 0;                // bytes in the incomplete block so far
 };
 
-// For a known number of bytes that are added in any order, each byte once. Keeps the bytes of
-// incomplete blocks, so memory is small if the bytes come in few sequences.
+// Computes the checksums of a known number of bytes that are added in any order, each byte once.
+// Keeps the bytes of incomplete blocks in memory. So it needs little memory if the bytes are added
+// as a few increasing sequences.
 class PlacedChecksums {
  public:
   explicit PlacedChecksums(uint64_t bytes) : bytes_(bytes) {}
@@ -39,8 +40,8 @@ class PlacedChecksums {
   void add(uint64_t position, std::span<const std::byte> bytes);
   // Returns the number of bytes that were not added yet.
   uint64_t missing() const { return bytes_ - added_; }
-  // Returns the checksums of all bytes; more bytes can be added in order. Requires that no bytes
-  // are missing.
+  // Returns an object with the checksums of all bytes, to which more bytes can be added in order.
+  // Requires missing() == 0.
   BlockChecksums finish() const;
 
  private:

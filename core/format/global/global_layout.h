@@ -78,7 +78,8 @@ inline constexpr uint64_t round_up_to_page(uint64_t bytes) {
 
 namespace voxdag {
 
-// The order of the nodes in each level. The numbers are values of the header.
+// Order of the nodes in each level (docs/format.md, "Node order"). The numbers are the values of
+// the field in the header.
 enum class NodeOrder : uint32_t { kByHash = 1, kByFirstParent = 2 };
 
 // Returns the name of an order as users write it; "" for an order that is not known.

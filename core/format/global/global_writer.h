@@ -92,7 +92,8 @@ class GlobalFileWriter {
   // may write the next levels concurrently.
   void sync();
 
-  // Sets the order of the nodes, which the caller must follow. The default is the order by hash.
+  // Sets the order in which the caller will write the nodes of each level. The header names it. The
+  // default is the order by hash.
   void set_node_order(NodeOrder order);
 
   // Begins a level. Levels must come in the order L-2, L-3, ..., 0. A scene without voxels has no
@@ -108,9 +109,10 @@ class GlobalFileWriter {
   // Error{kLimit}, whose message names the level, if the level has more than 2^40 words.
   void end_level(const GlobalLevel& level);
 
-  // Places all levels, given from the bricks upwards, for a caller that knows their sizes. Then
-  // write_placed() writes words of any level, each word once and in any order, and finish_placed()
-  // completes the levels. Such a file cannot be resumed.
+  // Replaces begin_level() to end_level() for a caller that knows the sizes of all levels.
+  // place_levels() determines their offsets; `levels` begins with the bricks. Then write_placed()
+  // writes words of any level, each word once and in any order, and finish_placed() completes the
+  // levels. Such a file cannot be resumed.
   void place_levels(std::span<const GlobalLevel> levels);
   void write_placed(uint32_t level, uint64_t first, std::span<const uint32_t> words);
   void finish_placed();

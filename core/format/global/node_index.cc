@@ -39,7 +39,8 @@ uint64_t NodeIndex::guess_begin(uint64_t span) const {
   return first;
 }
 
-// Walks the nodes of the span from word `begin` and marks in words_ where they begin.
+// Walks the nodes of the span, the first of which begins at word `begin`. Marks in words_ the words
+// at which nodes begin.
 NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   const uint64_t end = std::min(level_.word_count, (span + 1) * kSpanWords);
   for (uint64_t i = span * kSpanWords / 64; i * 64 < end; ++i) words_[i].starts = 0;
@@ -55,8 +56,8 @@ NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   return walked;
 }
 
-// Walks spans again until each begins where the previous one ends. Returns the number of nodes of
-// the level. Sets Words::before at the beginning of each span.
+// Walks a span again if its guessed beginning is not the end of the previous span. Returns the
+// number of nodes of the level. Sets Words::before at the beginning of each span.
 uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
                          const std::string& where) {
   uint64_t nodes = 0, at = 0;

@@ -108,11 +108,11 @@ struct NodeWithChildren {
   int child_count() const { return kPopcount8[node.child_mask]; }
 };
 
-// Calls visit(NodeWithChildren) for the nodes of a span of `nodes`, in order. The lookups of the
-// children are random reads of memory. So nodes are processed in batches: the reads of a batch are
-// prefetched, and their cache misses overlap. `below` is the index of the level below.
-// `node_at(offset)` returns the node at a word offset. `prefetch(index)` prefetches the data that
-// visit() needs of a child, given the child's index.
+// Calls visit(NodeWithChildren) for the nodes of a span of `nodes`, in order. `below` is the index
+// of the next finer level. `node_at(offset)` returns the node at a word offset. `prefetch(index)`
+// prefetches the data that visit() needs about a child, given the child's index. The lookups of
+// children read memory at random places. So nodes are processed in batches: the reads of a batch
+// are prefetched, and their cache misses overlap.
 template <class NodeAt, class Prefetch, class Visit>
 void visit_span_with_children(const NodeIndex& nodes, uint64_t span, const NodeIndex& below,
                               const NodeAt& node_at, const Prefetch& prefetch, const Visit& visit) {

@@ -77,7 +77,8 @@ class Bytes {
     ::close(fd);
 #endif
   }
-  // The bytes are copied if they are not aligned to 8 bytes. Otherwise they must remain valid.
+  // Uses `size` bytes at `data`, which must remain valid. Copies them if `data` is not aligned to 8
+  // bytes; then they need not remain valid.
   Bytes(const void* data, uint64_t size) : size_(size) {
     if (reinterpret_cast<uintptr_t>(data) % 8 == 0) {
       borrowed_ = data;

@@ -23,8 +23,8 @@ std::string place_in(const voxdag_reader::File& file, uint32_t level, uint64_t w
   return file.path() + ": level " + std::to_string(level) + ", word " + std::to_string(word) + ": ";
 }
 
-// Calls visit(hash, at) for the nodes whose hashes have the number `range` in their `bits` highest
-// bits.
+// Calls visit(hash, at) for each node whose hash has the value `range` in its `bits` highest bits.
+// `at` is the word at which the node begins.
 template <class Visit>
 void visit_range(const HashedLevel& nodes, uint64_t range, int bits, const CancelToken& cancel,
                  const Visit& visit) {
@@ -74,7 +74,7 @@ bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, u
 void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
                           const CancelToken& cancel) {
   const bool has_bricks = level + 1 == file.brick_level();
-  uint64_t next = 0;  // first word of the next new node
+  uint64_t next = 0;  // word of the first node that no pointer has referred to yet
   const auto pass = [&](uint64_t at, const voxdag_reader::Node& node, int c) {
     const uint64_t child = node.child(c);
     if (child > next)

@@ -1,5 +1,6 @@
-// Checks of verify.h for files whose nodes are in the order by first parent, and the comparison of
-// nodes. The functions require that all nodes and pointers of the level are valid.
+// The checks of verify.h that only files in the order by first parent need (docs/format.md, "Node
+// order"), and a comparison of two nodes. All functions require that the nodes and pointers of the
+// level are valid.
 #pragma once
 
 #include <cstdint>
@@ -19,16 +20,17 @@ inline voxdag_reader::Node verified_node(const voxdag_reader::File& file, uint32
   return {*words, words + 1, file.level(level + 1).pointer_bits == 64};
 }
 
-// True if the node or brick at word `a` is before the one at word `b` in the total order of nodes
-// whose hashes are equal.
+// Compares two nodes or bricks of a level with equal hashes. True if the node at word `a` precedes
+// the node at word `b` in the total order.
 bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, uint64_t b);
 
-// Checks that the nodes of the next level are in the order by first parent: walking the pointers of
-// `level`, each pointer refers to the next new node or to an earlier node. Throws Error{kCorrupt}.
+// Checks that the nodes of level `level` + 1 are in the order by first parent: each pointer in
+// `level`, in order, refers to a node that an earlier pointer has referred to, or to the first node
+// after all of them. `index` is the index of `level`. Throws Error{kCorrupt}.
 void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
                           const CancelToken& cancel);
 
-// A level with the truncated hashes of its nodes.
+// A level and the truncated hashes of its nodes.
 struct HashedLevel {
   const voxdag_reader::File& file;
   uint32_t level;
