@@ -52,7 +52,7 @@ struct GeometryOptions {
   SolidName solid = SolidName::kNone;  // the rule that fills the interior
   // A point in scene units. If it is set, only its enclosed space is filled.
   std::optional<std::array<double, 3>> seed;
-  uint32_t radius = 0;      // gaps of an enclosed solid's walls up to this many voxels are sealed
+  uint32_t radius = 0;      // enclosed solids: seals gaps of up to this many voxels
   AttributeSet attributes;  // attributes of the color grid's cells
   // Cells per edge of the color grid, a power of two from 4 to the resolution; 0: the build chooses
   // it.

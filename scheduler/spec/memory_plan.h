@@ -35,7 +35,7 @@
 //                   tables of a part being filled   the share                    SubDagTables
 //                   quadtree of a face              1/16 of the share            nobody
 //                 components at all faces           the rest                     ComponentSets
-//   enclose with a radius, before and after
+//   enclose with a radius: also find_blocked() and find_enclosed() (cube_walks.h)
 //                 cubes of the artifacts            any                          ArtifactTree
 //                 WorkerMemory, for every worker    7/8 of the rest / workers
 //                   segment writer                  1.5 MiB                      SegmentWriter

@@ -1,4 +1,4 @@
-// The sub-DAGs of artifacts, found by their cubes.
+// Finds the artifact that has the voxels of a cube of the grid.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,9 @@ namespace voxdag {
 class ArtifactTree {
  public:
   enum class Kind : uint8_t {
-    kEmpty,   // no root's cube meets the cube
-    kInside,  // the cube is in the cube of one root
-    kDivided  // the cubes of roots are inside the cube
+    kEmpty,   // the cube overlaps no cube of a root, so it has no voxels
+    kInside,  // the cube is inside the cube of one root
+    kDivided  // smaller cubes of roots are inside the cube
   };
   struct Place {
     Kind kind = Kind::kEmpty;
@@ -31,8 +31,8 @@ class ArtifactTree {
   Place find(const Cube& cube) const;
 
  private:
-  // The roots inside the cubes of parts. If a part's cube is inside the cube of a root, the part's
-  // cube.
+  // The cubes of the roots that overlap the parts, and their artifacts. If the cube of a root is
+  // larger than the part, `cubes` has the cube of the part instead.
   struct Roots {
     std::vector<Cube> cubes;
     std::vector<ArtifactRef> artifacts;

@@ -17,10 +17,11 @@
 namespace voxdag {
 namespace {
 
-constexpr int kCubes = 8;                 // a cube and its neighbors
-constexpr Cube kVoxelGrid{1, {1, 1, 1}};  // the grid of the voxels, in the grid of the positions
+constexpr int kCubes = 8;                 // a cube and its seven neighbors
+constexpr Cube kVoxelGrid{1, {1, 1, 1}};  // the voxels' grid, as a cube of the positions' grid
 
-// Returns nullopt for a cube that is not in the grid of the voxels.
+// Converts a cube of the positions' grid to the same cube of the voxels' grid. Returns nullopt if
+// the cube is outside the voxels' grid.
 std::optional<Cube> voxel_cube(const Cube& positions) {
   if (positions.level == 0) return std::nullopt;
   Cube out{positions.level - 1, {}};
@@ -32,8 +33,9 @@ std::optional<Cube> voxel_cube(const Cube& positions) {
   return out;
 }
 
-// A pass over all cubes that computes their voxels from artifacts around them. Cubes are in the
-// grid of the positions.
+// Computes the blocked positions (kBlocked) or the enclosed voxels (kEnclosed) of all cubes of the
+// grid. The result of a cube is computed from the artifacts of the cube and its neighbors. Cubes
+// are cubes of the positions' grid.
 class WalkPass {
  public:
   enum class Kind { kBlocked, kEnclosed };
@@ -71,7 +73,8 @@ class WalkPass {
  private:
   using Places = std::array<ArtifactTree::Place, kCubes>;
 
-  // Returns the cube, or its neighbor, in the grid of the artifacts; nullopt if it is outside.
+  // Returns a neighbor of the cube, or the cube itself if `neighbor` is 0, as a cube of the
+  // artifacts' grid. Returns nullopt if it is outside this grid.
   std::optional<Cube> source_cube(const Cube& cube, int neighbor) const {
     Cube out = cube;
     for (int a = 0; a < 3; ++a) {
@@ -87,7 +90,8 @@ class WalkPass {
     for (int n = 0; n < kCubes; ++n)
       if (const auto source = source_cube(cube, n))
         out[static_cast<size_t>(n)] = tree_.find(*source);
-    // The grid of the positions contains the grid of the voxels.
+    // The complete grid of the positions is outside the artifacts' grid for source_cube(), but
+    // contains it. So find_cubes() must divide it.
     if (kind_ == Kind::kBlocked && cube.level == 0) out[0].kind = ArtifactTree::Kind::kDivided;
     return out;
   }
@@ -97,7 +101,8 @@ class WalkPass {
         places, [](const auto& place) { return place.kind == ArtifactTree::Kind::kEmpty; });
   }
 
-  // Finds the largest cubes whose artifacts, and those of their neighbors, are not divided.
+  // Adds the largest cubes in `cube` to cubes_ for which a single artifact has all voxels of the
+  // cube, and a single artifact has all voxels of each neighbor. Skips cubes with an empty result.
   void find_cubes(const Cube& cube) {
     const Places around = places(cube);
     if (is_empty(around)) return;
@@ -107,7 +112,8 @@ class WalkPass {
     for (int octant = 0; octant < 8; ++octant) find_cubes(cube.child(octant));
   }
 
-  // Filters a cube, or its octants if the cube does not fit the memory.
+  // Computes the result of a cube, or of its octants if the cube does not fit in the worker's
+  // memory.
   void filter(EncloseWorker& worker, const Cube& cube) {
     job_.context.cancel.check();
     const Cube out = kind_ == Kind::kBlocked ? cube : *voxel_cube(cube);
@@ -148,7 +154,8 @@ class WalkPass {
     if (root.exists) worker.add(out, shape_, tables);
   }
 
-  // Reads the voxels of the cube or of a neighbor; of the neighbor, only voxels near the cube.
+  // Reads the voxels of a neighbor of the cube, or of the cube itself if `neighbor` is 0. Reads
+  // only the voxels of the neighbor that are near the cube.
   std::optional<NodeLevels> read_source(EncloseWorker& worker, const ArtifactTree::Place& place,
                                         const Cube& cube, int neighbor,
                                         PooledMemory& memory) const {
@@ -164,7 +171,7 @@ class WalkPass {
   const uint32_t radius_;
   const ArtifactTree tree_;
   FilledParts& result_;
-  const uint32_t levels_;  // of the grid of the positions
+  const uint32_t levels_;  // of the positions' grid
   const DagShape shape_;   // of the result
   EncloseWorkers workers_;
   std::vector<Cube> cubes_;

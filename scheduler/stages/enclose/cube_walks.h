@@ -1,10 +1,13 @@
-// The passes of the stage `enclose` for walks of a cube of V + 1 voxels per edge (--radius V,
-// core/dag/space/cube_walk.h). They come before and after the search for enclosed space:
+// Two passes of the stage `enclose` that builds with --radius V need, because a cube of V + 1
+// voxels per edge walks through the empty space (core/dag/space/cube_walk.h explains the terms).
+// One pass precedes the search for enclosed space, which finds the closed positions; the other
+// follows it:
 //
 //   shell -> find_blocked() -> blocked positions -> closed positions -> find_enclosed() -> solid
 //
-// A position may have coordinates down to -V. So positions are cubes of a larger grid, with twice
-// the resolution, whose last octant is the grid of the voxels.
+// Coordinates of positions can be as low as -V. So positions have their own grid of twice the
+// resolution, in which they are stored like voxels. Its octant with the largest coordinates is the
+// grid of the voxels.
 #pragma once
 
 #include <vector>
@@ -18,12 +21,13 @@ namespace voxdag {
 // Returns the shape of the grid of the positions. `shape` is the shape of the grid of the voxels.
 DagShape position_shape(const DagShape& shape);
 
-// Completes `blocked`: the blocked positions of the walks around the voxels of `shell`. Throws
-// Error{kCorrupt} for a damaged artifact.
+// Computes the blocked positions from the voxels of `shell`, and completes `blocked` with them.
+// Throws Error{kCorrupt} for a damaged artifact.
 void find_blocked(BuildJob& job, const std::vector<FilledPart>& shell, FilledParts& blocked);
 
-// Completes `solid`: the enclosed voxels and the voxels of the shell. `closed` has the closed
-// positions. Warns if no voxel is enclosed. Throws like find_blocked().
+// Computes the enclosed voxels, which include the shell, from the closed positions in `closed`, and
+// completes `solid` with them. Warns if the solid has no voxels besides the shell. Throws like
+// find_blocked().
 void find_enclosed(BuildJob& job, const std::vector<FilledPart>& closed, FilledParts& solid);
 
 }  // namespace voxdag

@@ -47,8 +47,8 @@ struct LabeledSpace {
 
 class Enclosure {
  public:
-  // Encloses the space around `walls`, whose cubes are in a grid of this shape. The filled parts
-  // become `result`.
+  // Fills the empty space that `walls` enclose. `shape` is the shape of the grid that has the
+  // walls. The filled parts complete `result`.
   Enclosure(BuildJob& job, const std::set<Cube>& too_large, const std::vector<FilledPart>& walls,
             const DagShape& shape, FilledParts& result)
       : job_(job),
@@ -256,7 +256,8 @@ class Enclosure {
   std::map<Cube, std::unique_ptr<LabeledSpace>> kept_;  // labels that are not computed again
 };
 
-// Encloses the space around `walls`. Divides parts that exceed the memory.
+// Fills the empty space that `walls` enclose, and completes `result`. If a part exceeds the memory,
+// starts over with smaller parts there.
 void enclose_space(BuildJob& job, const std::vector<FilledPart>& walls, const DagShape& shape,
                    FilledParts& result) {
   std::set<Cube> too_large;
@@ -274,7 +275,7 @@ std::vector<FilledPart> shell_parts(const BuildJob& job) {
   return parts;
 }
 
-// Encloses the space that walks of a cube do not reach.
+// Fills the space that a walking cube cannot cover (cube_walks.h).
 void enclose_by_cube(BuildJob& job) {
   FilledParts &blocked = *job.blocked, &closed = *job.closed;
   if (!closed.is_complete()) {

@@ -8,14 +8,14 @@
 //   fill    each part again: its filled sub-DAG (core/dag/space/enclosed_fill.h) becomes an
 //           artifact
 //
-// With a radius, these steps work on the positions of a cube that walks (cube_walks.h), instead of
-// on voxels.
+// With a radius, these steps work on positions of a walking cube instead of voxels (cube_walks.h).
 //
 // A part is the cube of a subvolume. A subvolume that exceeds a worker's memory is processed as
 // several parts. Empty cubes between the parts are components as well.
 //
-// Durable output: FilledParts, and with a radius two more of them for the positions. Resume rule:
-// filled parts are kept; the labels are computed again unless all parts are filled.
+// Durable output: FilledParts, and with a radius two more FilledParts with the blocked and the
+// closed positions. Resume rule: filled parts are kept; the labels are computed again unless all
+// parts are filled.
 #pragma once
 
 #include "scheduler/state/job/build_job.h"

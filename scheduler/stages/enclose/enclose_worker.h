@@ -1,5 +1,5 @@
-// The memory and the files of a worker of the stage `enclose`, and the end of a pass over the parts
-// of the grid.
+// A worker of the stage `enclose`, with its memory and its files, and functions that end a pass
+// over the parts of the grid.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +22,15 @@ class EncloseWorker {
   EncloseWorker(BuildJob& job, uint64_t share_bytes, uint32_t segment);
 
   ArtifactReader open(const WorkFolder& work, const ArtifactRef& artifact);
-  // Writes the sub-DAG of a part to `filled`, and adds it to `done`. Throws OutOfBudget.
+  // Writes the sub-DAG in `tables`, the result for the part `cube`, to `filled` as an artifact.
+  // Adds the part to `done`. Throws OutOfBudget.
   void add(const Cube& cube, const DagShape& shape, SubDagTables& tables);
   // True if the last save() was more than a checkpoint interval ago.
   bool is_due(const BuildJob& job) const;
   // Makes the parts in `done` durable, and moves them to `result`.
   void save(FilledParts& result);
-  // Throws Error{kOutOfMemory}: a part of the smallest edge does not fit the share.
+  // Throws Error{kOutOfMemory}, which says that even a part of the smallest edge does not fit in
+  // the worker's share of the memory.
   [[noreturn]] void refuse_memory() const;
 
   MemoryBudget share;
@@ -44,11 +46,12 @@ class EncloseWorker {
 
 using EncloseWorkers = std::vector<std::unique_ptr<EncloseWorker>>;
 
-// Each worker gets a new segment.
+// Makes the workers that `memory` allows. Each worker writes to a new segment.
 EncloseWorkers make_enclose_workers(BuildJob& job, const WorkerMemory& memory);
 
-// Marks `result` as complete with `parts`, which are in segments of the workers or of earlier runs.
-// Saves the record if a worker has saved parts, because then the pass has taken long.
+// Completes `result` with `parts`, whose artifacts are in segments of the workers or of earlier
+// runs. If a worker has saved parts, the pass has taken long; then also makes the complete record
+// durable.
 void complete_pass(FilledParts& result, std::vector<FilledPart> parts, EncloseWorkers& workers);
 
 // Warns if the solid in `filled` has no interior or, in a build with a seed, if `is_seed_outside`.

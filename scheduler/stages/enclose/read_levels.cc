@@ -107,7 +107,7 @@ class LevelsReader {
     return frame_.children[at + static_cast<size_t>(popcount8(mask & ((1u << octant) - 1)))];
   }
 
-  // Returns the octants of a level's nodes that are read.
+  // Returns a mask of the octants that are read from the nodes of level `number`.
   uint32_t clipped_octants(uint32_t number) const {
     const bool is_whole =
         static_cast<int>(artifact_.shape().grid_levels - number) <= clip_.whole_log2;

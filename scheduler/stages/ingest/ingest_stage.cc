@@ -23,11 +23,12 @@ namespace {
 // Maximum expected bricks per subvolume. Building that many takes a fraction of a second, and their
 // tables fit in the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
-// The same for flat subvolumes (SubvolumeLimits), which take 3 to 16 ns per expected brick. Larger
-// subvolumes have fewer nodes in common, so there are fewer rows to merge.
+// Maximum expected bricks per flat subvolume (SubvolumeLimits), which takes 3 to 16 ns per expected
+// brick. It is larger, because larger subvolumes store fewer equal nodes more than once, so the
+// merge has fewer rows.
 constexpr double kMaxBricksPerFlatSubvolume = 128e6;
-// A flat subvolume usually needs less memory per expected brick than this. If it needs more than a
-// worker has, it is split.
+// A flat subvolume usually needs less memory per expected brick than this. A subvolume that needs
+// more memory than a worker has is split.
 constexpr double kBytesPerFlatBrick = 16;
 // A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
 // kMinBricksPerSubvolume expected bricks.
@@ -52,8 +53,8 @@ int64_t longest_edge(const BuildSpec& spec) {
   return edge;
 }
 
-// True if the build certainly uses the CPU backend of this process. A GPU has less memory than the
-// host, and the tasks of a cluster have less than `run` says.
+// True if the CPU backend in this process certainly builds the subvolumes, with the memory in
+// `run`. A GPU and the tasks of a cluster may have less memory.
 bool builds_on_this_cpu(const BuildSpec& spec) {
   const RunOptions& run = spec.run;
   if (run.cluster) return false;
@@ -61,9 +62,9 @@ bool builds_on_this_cpu(const BuildSpec& spec) {
          (run.backend == BackendName::kAuto && !cuda_device_available());
 }
 
-// Returns the maximum weight of flat subvolumes: the maximum that leaves enough subvolumes for
-// every thread and whose tables fit in half of a worker's share. Returns 0 if flat subvolumes have
-// no separate maximum.
+// Returns the maximum weight of flat subvolumes. With this maximum, there are enough subvolumes for
+// all threads, and the tables of a subvolume fit in half of a worker's share. Returns 0 if flat
+// subvolumes have no separate maximum.
 double max_flat_weight(const BuildSpec& spec, double total_weight) {
   if (!builds_on_this_cpu(spec)) return 0;
   const RunOptions& run = spec.run;

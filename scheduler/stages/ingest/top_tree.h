@@ -36,8 +36,8 @@ struct SubvolumePlan {
 
 // Maximum weight and edge of subvolumes.
 struct SubvolumeLimits {
-  // Minimum average weight of the triangles of a *flat* subvolume. So large triangles have many
-  // equal nodes: the tables of a flat subvolume are small for its weight.
+  // A subvolume is *flat* if its triangles have at least this weight on average. Large triangles
+  // make many equal nodes, so the tables of a flat subvolume are small for its weight.
   static constexpr double kFlatTriangleBricks = 256;
 
   double weight = 0;

@@ -129,8 +129,9 @@ PlannedRows planned_rows(const PreparedScene& scene) {
   return rows;
 }
 
-// Returns how often the work folder stores the artifacts of an enclosed solid, in addition to its
-// shell: with a radius, as blocked and as closed positions as well.
+// Returns the number of sets of artifacts that the work folder stores for an enclosed solid, in
+// addition to its shell: the filled solid, and with a radius also the blocked and the closed
+// positions, which take about the same space.
 double artifact_copies(const GeometryOptions& options) { return options.radius > 0 ? 3 : 1; }
 
 // The disk space and the memory that only a solid needs.

@@ -90,8 +90,8 @@ NodeLevels take_levels(PooledMemory& memory, SubDagTables& tables) {
   return out.finish();
 }
 
-// Returns the closed positions of the walks of a cube (core/dag/space/cube_walk.h), in a grid of
-// twice the resolution whose last octant is the grid of the voxels.
+// Returns the closed positions of a walking cube (core/dag/space/cube_walk.h). They are in a grid
+// of twice the resolution, whose octant with the largest coordinates is the grid of the voxels.
 NodeLevels closed_positions(PooledMemory& memory, const NodeLevels& shell, uint32_t radius,
                             uint32_t levels) {
   const int size_log2 = static_cast<int>(levels);

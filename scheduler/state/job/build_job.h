@@ -64,8 +64,8 @@ struct BuildJob {
   std::unique_ptr<SolidRows> rows;
   // Null unless the solid is enclosed and the scene was read.
   std::unique_ptr<FilledParts> filled;
-  // The blocked and the closed positions of the walks (stages/enclose/cube_walks.h). Null unless
-  // the solid is enclosed with a radius and the scene was read.
+  // The blocked and the closed positions of a walking cube (stages/enclose/cube_walks.h). Null in
+  // builds without a radius, and before the scene is read.
   std::unique_ptr<FilledParts> blocked, closed;
   bool start_over;  // the stored job is ignored
 };
