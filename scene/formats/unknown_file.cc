@@ -9,7 +9,8 @@
 namespace voxdag {
 namespace {
 
-// Returns the file's format for the error message. `begin` is the beginning of the file.
+// Returns a description of the file for the error message, such as "is empty". `begin` is the
+// beginning of the file.
 std::string describe(std::string_view begin) {
   if (begin.empty()) return "is empty";
   const std::string known = describe_other_format(begin);

@@ -17,14 +17,16 @@ bool is_keyword(std::string_view word) {
       kKeywords, [&](std::string_view keyword) { return equals_in_any_case(keyword, word); });
 }
 
-// True if `word` and the words `after` it begin a facet. A name may contain the word "facet".
+// True if `word`, followed by the text `after`, begins a facet. The word "facet" alone does not
+// suffice, because the name of a solid may contain it.
 bool begins_facet(std::string_view word, std::string_view after) {
   if (!equals_in_any_case(word, "facet")) return false;
   const std::string_view next = next_word(after);
   return equals_in_any_case(next, "normal") || equals_in_any_case(next, "outer");
 }
 
-// True if `word` and the words `after` it begin a part of the format.
+// True if `word`, followed by the text `after`, is part of STL: it begins a facet or a vertex, or
+// ends a loop, a facet or a solid.
 bool begins_statement(std::string_view word, std::string_view after) {
   if (equals_in_any_case(word, "vertex")) return parse_real<double>(next_word(after)).has_value();
   constexpr std::string_view kEnds[] = {"endloop", "endfacet", "endsolid"};
@@ -88,7 +90,8 @@ bool PolygonReader::next_line() {
   return found;
 }
 
-// Skips the name, the numbers or other words after a word other than "vertex".
+// Processes a word other than "vertex": skips the name or the numbers that follow it, or the
+// unknown words that it begins.
 void PolygonReader::skip(std::string_view word) {
   const auto is = [&](std::string_view keyword) { return equals_in_any_case(word, keyword); };
   if (!is_keyword(word)) return skip_unknown();
@@ -105,15 +108,15 @@ void PolygonReader::skip(std::string_view word) {
   }
 }
 
-// Skips words that are not part of STL. A line of one word after a line that ends with "solid" is
-// a name.
+// Skips words that are not part of STL, and counts them for a warning. Does not count a single word
+// in the line after "solid", because it is the name of the solid.
 void PolygonReader::skip_unknown() {
   if (is_name_next_ && trimmed(rest_).empty()) return;
   if (unknown_words_++ == 0) first_unknown_line_ = lines_.number();
   skip_words(begins_statement);
 }
 
-// Skips the rest of the line, or the words up to the first one for which `is_end` is true.
+// Skips the rest of the line, but stops before the first word for which `is_end` is true.
 void PolygonReader::skip_words(bool (*is_end)(std::string_view word, std::string_view after)) {
   for (std::string_view after = rest_;; rest_ = after) {
     const std::string_view word = next_word(after);

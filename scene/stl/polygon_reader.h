@@ -1,7 +1,8 @@
 // Reads the polygons of an ASCII STL file one after another, and triangulates them. A polygon is a
 // sequence of "vertex x y z" without another keyword in between; it usually has three vertices. All
 // other words (normals, names, loops) do not affect the triangles. Keywords may be in upper or
-// lower case. Line ends only separate words, and end the names of solids. Not thread-safe.
+// lower case. Line ends separate words like blanks; in addition, they end the names of solids. Not
+// thread-safe.
 #pragma once
 
 #include <array>
@@ -66,7 +67,7 @@ class PolygonReader {
   LineReader lines_;
   std::string_view rest_;  // the part of the current line that is not read
   bool in_facet_ = false;
-  bool is_name_next_ = false;  // the last line ended with "solid", so the next may be its name
+  bool is_name_next_ = false;  // the last line ended with "solid": the next may be its name
   bool is_cut_off_ = false;
   std::vector<std::array<double, 3>> vertices_;
   polygon::Triangulator triangulator_;

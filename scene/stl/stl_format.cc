@@ -44,9 +44,9 @@ bool has_facet(std::string_view text) {
   return false;
 }
 
-// True if the text begins with "solid", and the next line that is not blank begins with "facet",
-// "endsolid" or "color", or a facet begins elsewhere. Also true if no such next line exists. The
-// rest of the first line is a name.
+// True if the text begins with "solid", and one of these conditions holds: the next line that is
+// not blank begins with "facet", "endsolid" or "color"; there is no such line; or a facet begins
+// anywhere after the first line. The rest of the first line is the name of the solid.
 bool is_ascii(std::string_view text) {
   if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
   if (next_keyword(text) != "solid") return false;

@@ -1,6 +1,7 @@
 // Reads the lines of a text file from front to back, with jumps, through one window. A line ends
 // with LF, CR LF or CR; the last one may have no end. A byte order mark of UTF-8 at the beginning
-// of the file is skipped, and so are marks at its end (characters.h). Not thread-safe.
+// of the file is skipped, and so are end marks (characters.h) at the end of the file. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>

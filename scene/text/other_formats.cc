@@ -107,7 +107,8 @@ constexpr WideEncoding kWide[] = {{"UTF-32LE", {"\xff\xfe\0\0", 4}, 4, 0},
                                   {"UTF-16LE", "\xff\xfe", 2, 0},
                                   {"UTF-16BE", "\xfe\xff", 2, 1}};
 
-// True if the first characters are ASCII in this encoding.
+// True if the text begins with at least four characters, and its first characters are ASCII in this
+// encoding.
 bool is_ascii_in(const WideEncoding& encoding, std::string_view begin) {
   constexpr size_t kMinUnits = 4, kMaxUnits = 16;
   const size_t units = std::min(begin.size() / encoding.bytes, kMaxUnits);
@@ -125,9 +126,9 @@ const WideEncoding* wide_encoding_of(std::string_view begin) {
   return nullptr;
 }
 
-// True for the header of a tar file, also of one before POSIX, which has no magic number. The
-// header has its checksum in octal digits: the sum of its bytes, with blanks in place of the
-// digits.
+// True if the file begins with the header of a tar file, also of a tar file from before POSIX,
+// which has no magic number. The header contains its checksum in octal digits: the sum of its
+// bytes, with blanks in place of the digits.
 bool is_tar_header(std::string_view begin) {
   constexpr size_t kHeader = 512, kDigitsAt = 148, kDigits = 8;
   if (begin.size() < kHeader) return false;
@@ -152,7 +153,7 @@ std::string contents_of_markup(std::string_view text) {
   return "an XML file";
 }
 
-// True if the file has the bytes of the format.
+// True if the file has the bytes of the format at their offset.
 bool matches(const KnownFormat& known, std::string_view begin) {
   if (begin.size() <= known.offset || !begin.substr(known.offset).starts_with(known.bytes))
     return false;
@@ -160,7 +161,7 @@ bool matches(const KnownFormat& known, std::string_view begin) {
   return !known.is_word || end == begin.size() || is_blank(begin[end]) || is_line_end(begin[end]);
 }
 
-// True if no other text is likely to begin with the bytes of the format.
+// True if text of other formats is unlikely to begin with the bytes of this format.
 bool is_distinct_in_text(const KnownFormat& known) {
   return known.offset == 0 && (known.is_word || known.bytes.size() >= 5);
 }
@@ -176,8 +177,8 @@ std::string_view without_leading_comments(std::string_view text) {
   }
 }
 
-// Returns the number of words in the first line of the text if all of them are numbers, otherwise
-// 0. Removes the line.
+// Removes the first line from the text. Returns the number of words in this line if all of them are
+// numbers, otherwise 0.
 size_t take_line_of_numbers(std::string_view& text) {
   const size_t end = std::min(text.find_first_of("\r\n"), text.size());
   std::string_view line = text.substr(0, end);
@@ -188,7 +189,8 @@ size_t take_line_of_numbers(std::string_view& text) {
   return count;
 }
 
-// Describes a text that begins with the number of its points, or with the size of a grid of points.
+// Describes a file of the format PTS, which begins with the number of its points, or PTX, which
+// begins with the size of a grid of points. Returns "" for other texts.
 std::string describe_points(std::string_view text) {
   if (take_line_of_numbers(text) != 1) return "";
   size_t numbers = take_line_of_numbers(text);

@@ -20,7 +20,8 @@ std::string describe_other_format(std::string_view begin);
 // a Git LFS pointer or a web page.
 bool is_other_text(std::string_view begin);
 
-// True if the first bytes have control characters, so that they are not ASCII, UTF-8 or similar.
+// True if the first bytes contain control characters that do not occur in text in ASCII, UTF-8 or a
+// similar encoding.
 bool is_no_text(std::string_view begin);
 
 // Returns the text without white space at its beginning.

@@ -12,7 +12,7 @@ namespace {
 // pieces, so the row has too many words and is refused.
 constexpr size_t kMaxWord = 64;
 
-// Maximum number of marks at the end of a text.
+// Maximum number of end marks (characters.h) at the end of a text.
 constexpr size_t kMaxMarks = 4096;
 
 }  // namespace
@@ -36,8 +36,8 @@ std::string_view WordScanner::word() {
   return text.substr(0, size);
 }
 
-// Returns the word at offset_, and moves past it. If it ends with marks at the end of the file,
-// leaves them out.
+// Returns `word`, which is at offset_ and ends with end marks, and moves past it. At the end of the
+// file, returns it without the end marks.
 std::string_view WordScanner::word_before_marks(std::string_view word) {
   const uint64_t begin = offset_;
   size_t size = word.size();
@@ -70,7 +70,7 @@ std::string_view WordScanner::text_at(uint64_t offset) {
   return {reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kMaxWord)};
 }
 
-// True if only marks of the end of the text follow (characters.h).
+// True if only end marks (characters.h) follow, or nothing.
 bool WordScanner::is_at_end() {
   const auto bytes = window_.at(offset_, kMaxMarks);
   return offset_ + bytes.size() >= window_.file().size() &&

@@ -1,5 +1,5 @@
-// Reads the lines of a text file word by word, such as the rows of an ASCII PLY file. Blank lines
-// and marks at the end of the file (characters.h) are skipped. Not thread-safe.
+// Reads the lines of a text file word by word, such as the rows of an ASCII PLY file. Blank lines,
+// and end marks (characters.h) at the end of the file, are skipped. Not thread-safe.
 #pragma once
 
 #include <cstdint>

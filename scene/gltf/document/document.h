@@ -118,7 +118,8 @@ struct Primitive {
   int indices = -1;
   std::vector<int> targets;  // POSITION of each morph target, -1 if it has none
   std::vector<JointSet> joint_sets;
-  // As in the file, and unchecked, like the next two members. kBrokenMaterial: not an index.
+  // Index of the material as in the file; -1 if the file has none, and kBrokenMaterial if its value
+  // is not an index. This index and the next two members are not checked.
   int material = -1;
   int color = -1;                        // COLOR_0
   std::vector<int> texture_coordinates;  // TEXCOORD_n
@@ -183,7 +184,7 @@ struct Document {
   // empty. No image is loaded: a data: URI ends at its comma.
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
-  WarningList material_warnings;      // about the model; not in `warnings`
+  WarningList material_warnings;      // about members of `model`; not in `warnings`
 
   bool quantized = false;     // KHR_mesh_quantization is used
   bool has_restarts = false;  // KHR_mesh_primitive_restart is used

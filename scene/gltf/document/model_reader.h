@@ -19,9 +19,10 @@ class ModelReader {
  public:
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
-  // Each function appends an element to the JSON text that parse() passes to tinygltf, or to the
-  // images. Broken members are left out, with a warning for parse(). Throws Error{kOutOfMemory} if
-  // the model would not fit the budget.
+  // Each function adds an element: add_image() to the images, the others to the JSON text that
+  // parse() passes to tinygltf. They omit broken members, and add a warning for each of them to the
+  // warnings that parse() sets. They throw Error{kOutOfMemory} if the model would not fit in the
+  // budget.
   void add_material(const ElementText& element);
   void add_texture(const ElementText& element);
   void add_sampler(const ElementText& element);
@@ -31,7 +32,7 @@ class ModelReader {
   void add_violation(const std::string& message);
 
   // Sets the model of the document, its image_uris and its material_warnings. Materials, textures
-  // and samplers that tinygltf refuses are left out with a warning. Call it once, after all
+  // and samplers that tinygltf refuses are left out with a warning. Call parse() once, after all
   // elements were added.
   void parse(Document& document);
 

@@ -15,7 +15,8 @@ int index_or_none(const JsonElement& object, const char* key) {
   return member ? member->as_index() : -1;
 }
 
-// Returns the index of a material. A value that is not an index does not affect the geometry.
+// Returns the index of a primitive's material, or kBrokenMaterial for a value that is not an index.
+// Such a value is no error, because it does not affect the geometry.
 int material_index(const JsonElement& element) {
   const auto number = element.whole_number();
   return number && *number <= INT32_MAX ? static_cast<int>(*number) : Primitive::kBrokenMaterial;

@@ -135,7 +135,7 @@ bool has_shape(const MemberJson& value, Shape shape) {
   return false;
 }
 
-// Returns a value of a wrong shape for a message.
+// Returns a text that shows a member's value in an error message.
 std::string shown(const MemberJson& value) {
   if (value.is_object()) return "an object";
   if (value.is_string()) return '"' + printable(value.get_ref<const std::string&>()) + '"';
@@ -145,8 +145,8 @@ std::string shown(const MemberJson& value) {
          (are_all ? "" : " that are not all numbers");
 }
 
-// Removes broken members from `object`. `path` is the object's place in the element; it is empty or
-// ends with a dot.
+// Removes the members of `object` that break a rule in `rules`, and reports them and missing
+// required members. `path` is the object's place in the element; it is empty or ends with a dot.
 template <class Report>
 void remove_broken(MemberJson& object, std::span<const MemberRule> rules, const std::string& path,
                    const Report& report) {

@@ -15,8 +15,9 @@ enum class MaterialSection { kMaterials, kTextures, kSamplers };
 // Receives the name of the element ("" if it has none), and a message about one of its members.
 using ReportMember = std::function<void(const std::string& name, const std::string& message)>;
 
-// Returns the JSON text of the element without the members that break a rule of glTF, and reports
-// each of them. An element that is not an object becomes {}.
+// Returns the JSON text of the element without the members that break a rule of glTF. Reports each
+// of these members, and each required member that is missing. For an element that is not an object,
+// returns {}.
 std::string without_broken_members(MaterialSection section, const ElementText& element,
                                    const ReportMember& report);
 

@@ -16,12 +16,12 @@ struct MaterialSource {
   TextureTransform transform;
   bool only_emits = false;  // the color is the emitted light, which vertex colors do not change
   std::string problem;      // why the texture cannot be read; "" for a readable or missing texture
-  std::string sampler_problem;  // why the texture's sampler is not used; "" if it is, or is missing
+  std::string sampler_problem;  // why the texture's sampler is not used; "" if it is used or absent
 };
 
 // Reads material `index` of the model. Uses KHR_materials_pbrSpecularGlossiness, if the material
-// has it, instead of metallic-roughness. Ignores members of a wrong type
-// (material_members.h reports them).
+// has it, instead of metallic-roughness. Ignores members of a wrong type, which material_members.h
+// has reported.
 MaterialSource read_material(const tinygltf::Model& model, int index);
 
 }  // namespace voxdag::gltf

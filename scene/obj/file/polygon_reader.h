@@ -35,8 +35,8 @@ class PolygonReader {
   uint32_t material() const { return material_; }
   // Returns the index of a corner's texture coordinates.
   uint32_t texcoord(size_t k) const { return resolve(corners_[k].texture, texcoords_before_); }
-  // Return the polygon and its line, and the vertex index of a corner as written in the file, for
-  // messages.
+  // Return texts for messages: the polygon with its line, and the vertex index of corner `k` as it
+  // is written in the file.
   std::string place() const;
   std::string index_text(size_t k) const;
 
@@ -52,8 +52,8 @@ class PolygonReader {
   std::vector<uint32_t> vertices_;
 };
 
-// Return parts of messages: the face and its line, and a corner that is no index. `rest` begins
-// with the corner.
+// Return parts of messages: the face with its line, and a description of a corner that is not an
+// index. `rest` is the text of the line from this corner.
 std::string place_of_face(uint64_t face, uint64_t line);
 std::string describe_bad_corner(size_t corner, std::string_view rest);
 

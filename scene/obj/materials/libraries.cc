@@ -33,7 +33,7 @@ std::vector<std::string> names_of(std::string_view arguments) {
   return has_ending ? names : words;
 }
 
-// Throws Error for a file that is no text, such as a compressed library.
+// Throws Error if the file is not a text file, for example a compressed library.
 void refuse_other_format(const ReadableFile& file) {
   const std::string begin = first_bytes_of(file);
   const std::string_view text = file.size() == begin.size() ? without_end_marks(begin) : begin;
