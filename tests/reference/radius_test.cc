@@ -55,7 +55,7 @@ TEST_F(Radius, EqualsTheOracle) {
       expect_sealed(kind, edge, radius);
 }
 
-// The smallest cubes that are filtered have 4, 8 and 16 voxels per edge.
+// With these radii, the smallest cubes that cube_walk.h processes have 4, 8 and 16 voxels per edge.
 TEST_F(Radius, LargeRadius) {
   for (const int radius : {3, 5, 16}) expect_sealed(oracle::SolidKind::kHoles, 32, radius);
 }

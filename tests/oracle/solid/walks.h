@@ -1,4 +1,4 @@
-// Enclosed solids for walks of a cube, by brute force: moves the cube through the grid, voxel by
+// Computes enclosed solids with a radius by brute force: moves a cube through the grid, voxel by
 // voxel.
 #pragma once
 

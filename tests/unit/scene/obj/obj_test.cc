@@ -202,7 +202,7 @@ TEST(Obj, VertexColors) {
 
 const std::string kTriangleLines = kVertexLines + "vt 0 0\nvt 1 0\nvt 0.5 0.25 0\n";
 
-// A library that is compressed, or in another encoding, is named.
+// The warning about a library that is compressed or in another encoding names its format.
 TEST(Obj, LibrariesThatAreNoText) {
   const auto warnings_of_library = [](const std::string& text) {
     const WithLibraries open("mtllib a.mtl\n" + kTriangleLines + "f 1 2 3\n",

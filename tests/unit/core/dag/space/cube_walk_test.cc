@@ -1,4 +1,4 @@
-// The positions and voxels of walks of a cube, compared with windows of single voxels.
+// Compares the results of cube_walk.h with a search of the window of each single voxel.
 #include "core/dag/space/cube_walk.h"
 
 #include <gtest/gtest.h>
@@ -53,7 +53,8 @@ class FilteredOctant {
     }
   }
 
-  // Returns the voxels of octant `first`; neighbor n of it is octant first ^ n.
+  // Applies `apply` to octant `first`, whose neighbor n is octant first ^ n. Returns the voxels of
+  // the result.
   SpaceGrid filter(int first, uint32_t radius, CubeFilter apply) {
     CubeNeighbors around;
     for (int n = 0; n < 8; ++n) around[static_cast<size_t>(n)] = places_[first ^ n];
@@ -74,7 +75,8 @@ TEST(CubeWalk, EqualsWindowsOfVoxels) {
     for (const bool is_divided : {false, true}) {
       SCOPED_TRACE(testing::Message() << "radius " << radius << ", divided " << is_divided);
       const int edge = radius == 5 ? 64 : 32, half = edge / 2;
-      // Few voxels, because a window must be empty or full somewhere.
+      // `few` has few voxels, so that some windows are empty, and `many` has few empty voxels, so
+      // that some windows are full.
       SpaceGrid few(edge), many(edge);
       const unsigned one_in = static_cast<unsigned>((radius + 1) * (radius + 1) * (radius + 1));
       few.for_each([&](const SpaceCell& c) {
