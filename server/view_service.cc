@@ -16,8 +16,9 @@ constexpr double kDrainS = 1;
 // replaced.
 constexpr size_t kMaxOpen = 2;
 constexpr size_t kMaxConcurrentTiles = 64;
-// Pages that may show the viewer in a frame: pages of this machine, such as notebooks. The viewer
-// of `voxdag view` only shows the file, so such a page cannot make a user change anything.
+// Origins whose pages may show the viewer in a frame: all pages that this machine serves, such as
+// notebooks. The service of `voxdag view` only shows a file. So a page with such a frame cannot
+// trick the user into changing anything.
 constexpr const char* kEmbedders =
     "http://localhost:* https://localhost:* http://127.0.0.1:* https://127.0.0.1:*";
 

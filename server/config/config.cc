@@ -14,8 +14,8 @@ constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
 constexpr const char* kExpectedOrigin =
     "expected an origin, such as https://lab.example.org or http://localhost:8888";
 
-// True for "http://HOST[:PORT]" and "https://HOST[:PORT]". The characters are limited, because
-// header fields contain origins.
+// True if the text has the form http://HOST[:PORT] or https://HOST[:PORT]. Allows only characters
+// of host names, IP addresses and ports, because origins are written to header fields of responses.
 bool is_origin(const std::string& text) {
   const size_t host = text.starts_with("https://") ? 8 : text.starts_with("http://") ? 7 : 0;
   constexpr const char* kAllowed =

@@ -16,7 +16,8 @@ struct JobLimits {
   unsigned max_concurrent = 1;
   uint64_t memory_bytes = 0;  // for all running jobs together; 0: half of the machine's memory
   unsigned threads = 0;       // default number per job; 0: all cores
-  // Limit of the folder DATA/cache, through which jobs share subvolumes; 0: no such folder.
+  // Maximum size of the folder DATA/cache, through which jobs share built subvolumes. With 0, jobs
+  // share none.
   uint64_t cache_bytes = 0;
   uint64_t min_free_disk_bytes = uint64_t{1} << 30;  // a job starts only if this much space is free
   int nice = 5;                                      // nice value of the jobs' processes
@@ -54,9 +55,9 @@ struct ServerConfig {
   std::string token_file;                // "": no tokens; only the loopback has access
   std::vector<std::string> scene_roots;  // absolute folders whose scenes jobs may name by path
   std::vector<std::string> hosts;  // names allowed in a Host header in addition to the loopback's
-  // Origins, SCHEME://HOST[:PORT], whose pages may show the viewer in a frame.
+  // Origins (SCHEME://HOST[:PORT]) whose web pages may show the viewer in a frame.
   std::vector<std::string> embed_origins;
-  // Origins whose pages may use the API.
+  // Origins whose web pages may send requests to the API.
   std::vector<std::string> cors_origins;
   // The program that runs jobs. The default is the running program itself, even if another version
   // was installed under the same name since.

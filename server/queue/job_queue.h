@@ -28,8 +28,8 @@ struct JobFilter {
   std::vector<JobState> states;  // empty: all states
   int64_t before = INT64_MAX;    // only smaller job numbers
   size_t limit = 50;
-  // Only jobs with this text in their name, scenes or labels, or at the beginning of their id.
-  // ASCII letters match in both cases. "": all jobs.
+  // Only jobs whose name, scenes or labels contain this text, or whose id begins with it. Case does
+  // not matter for ASCII letters. "": all jobs.
   std::string words;
   std::string label;  // only jobs with this label; "": all jobs
 };

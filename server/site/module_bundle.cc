@@ -9,7 +9,8 @@
 namespace voxdag::server {
 namespace {
 
-// Returns the path to which `name` leads from the module at `from`.
+// Returns the path of the module that the module at `from` imports as `name`, such as
+// "../lib/dom.js".
 std::string resolve_module(const std::string& from, std::string_view name) {
   std::string folder = from.substr(0, from.rfind('/') + 1);
   for (;;) {
@@ -25,13 +26,14 @@ std::string resolve_module(const std::string& from, std::string_view name) {
   }
 }
 
-// "{a, b as c}" as a pattern of an assignment: "{a, b: c}".
+// Converts the names of an import, "{a, b as c}", to the left side of an assignment, "{a, b: c}".
 std::string pattern_of(const std::string& names) {
   static const std::regex as(R"(\s+as\s+)");
   return std::regex_replace(names, as, ": ");
 }
 
-// Leaves out indentation, empty lines, and lines with only a comment.
+// Returns `source` without indentation, without empty lines, and without lines that only have a
+// comment.
 std::string without_comments(const std::string& source) {
   std::istringstream lines(source);
   std::string result;
@@ -48,7 +50,8 @@ class Bundle {
   explicit Bundle(const std::function<std::string(const std::string&)>& source_of)
       : source_of_(source_of) {}
 
-  // Adds a module after the modules that it imports. Returns the name of its exports.
+  // Adds the modules that a module imports, and then the module itself, unless they were already
+  // added. Returns the name of the variable that has the exports of the module.
   std::string add(const std::string& path) {
     const auto [known, is_new] = names_.try_emplace(path, "");
     if (!is_new) {
@@ -66,7 +69,8 @@ class Bundle {
   const std::string& text() const { return text_; }
 
  private:
-  // Removes the imports from `source`. Returns the statements that replace them.
+  // Removes the imports from `source`, and adds the imported modules. Returns the statements that
+  // assign the imported names.
   std::string take_imports(const std::string& path, std::string& source) {
     static const std::regex statement(
         "(?:^|\n)import\\s+(?:(\\{[^}]*\\})\\s*from\\s+)?\"([^\"]+)\";");
@@ -81,8 +85,8 @@ class Bundle {
     return statements;
   }
 
-  // Removes the word "export" and lists of exports. Returns the exported names, separated by
-  // commas.
+  // Removes the word "export" from declarations, and removes lists of exports. Returns all exported
+  // names, separated by commas.
   static std::string take_exports(const std::string& path, std::string& source) {
     static const std::regex declaration("(^|\n)export ((?:async )?function|class|const) (\\w+)");
     static const std::regex list("(^|\n)export \\{([\\w, ]+)\\};");
@@ -101,7 +105,7 @@ class Bundle {
   }
 
   const std::function<std::string(const std::string&)>& source_of_;
-  std::map<std::string, std::string> names_;  // "" while the module is being added
+  std::map<std::string, std::string> names_;  // results of add(), by path; "" until it returns
   std::string text_;
   int count_ = 0;
 };

@@ -1,5 +1,5 @@
-// Joins the JavaScript modules of a page into one module, so that a browser needs one request for
-// them.
+// Joins all JavaScript modules of a page into one module, so that a browser needs only one request
+// to load them.
 #pragma once
 
 #include <functional>
@@ -7,15 +7,19 @@
 
 namespace voxdag::server {
 
-// Returns one module with the module `entry` and all modules that it imports. `source_of` returns
-// the source of a module by its path, such as "viewer/main.js". Modules may have imports of the
-// forms
+// Returns the source of one module that contains the module `entry` and all modules that it
+// imports, directly or through others. source_of(path) returns the source of a module, such as
+// "viewer/main.js". Imports must begin a line and have one of these forms:
+//
 //     import {a, b as c} from "./module.js";      import "./module.js";
-// at the beginning of a line, and these exports:
+//
+// Exports must begin a line and have one of these forms:
+//
 //     export function f    export async function f    export class C    export const c
 //     export {a, b};
-// Leaves out lines with only a comment, and indentation. Throws std::logic_error for modules that
-// import each other, and for other forms of imports and exports.
+//
+// Leaves out indentation, and lines that only have a comment. Throws std::logic_error if modules
+// import each other in a cycle, or if an import or export has another form.
 std::string bundle_modules(const std::string& entry,
                            const std::function<std::string(const std::string& path)>& source_of);
 

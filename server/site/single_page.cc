@@ -28,7 +28,7 @@ std::string base64_of(std::string_view bytes) {
   return text;
 }
 
-// Writes a text file piece by piece.
+// Writes a text file in several parts. finish() returns the size of the file.
 class TextWriter {
  public:
   TextWriter(FileSystem& files, const std::string& path) : out_(files.create(path)) {}
@@ -47,7 +47,8 @@ class TextWriter {
   uint64_t bytes_ = 0;
 };
 
-// Writes the page with the files of a package. Returns the page's size.
+// Writes the page to `path`: the page of the viewer, into which the files of the package in the
+// folder `package` are inserted as base64. Returns the size of the page.
 uint64_t write_page(const std::string& package, const std::string& title, const std::string& path,
                     FileSystem& files, const CancelToken& cancel) {
   const query::PackageIndex index = query::PackageReader(files, package).index();

@@ -1,4 +1,5 @@
-// Writes a package and its viewer as one HTML file, which browsers can open without a web server.
+// Writes a package (query/package/package_index.h) and the viewer as one HTML file, which a browser
+// can open without a web server.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +10,13 @@
 
 namespace voxdag::server {
 
-// Maximum size of a package in one file. Browsers read the complete file before the first picture.
+// Maximum size of a package in one HTML file. It is limited because a browser must read the
+// complete file before it can show the first picture.
 inline constexpr uint64_t kMaxSinglePageBytes = uint64_t{256} << 20;
 
-// Writes the file `spec.output`. Replaces an existing file only if `replace` is true. Throws the
-// errors of write_package() and LockedOutputs, and Error{kLimit} for a larger package.
+// Writes the HTML file spec.output with the title `title`. Replaces an existing file only if
+// `replace` is true. Throws the errors of write_package() and LockedOutputs, and Error{kLimit} if
+// the package is larger than kMaxSinglePageBytes.
 query::PackageReport write_single_page(const voxdag_reader::File& file, query::PackageSpec spec,
                                        const std::string& title, bool replace, FileSystem& files,
                                        Progress& progress, const CancelToken& cancel);

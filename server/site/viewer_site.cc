@@ -33,7 +33,8 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-// True if a line of the viewer's page refers to other files of the service.
+// True if a line of viewer.html is not used in the page of a package: it refers to other files or
+// pages of the service, or has its title.
 bool is_of_service(const std::string& line) {
   constexpr const char* kParts[] = {"<link ", "<script ", "<title>", "id=\"home\"",
                                     "<!-- Loads the modules"};
@@ -41,8 +42,8 @@ bool is_of_service(const std::string& line) {
                              [&](const char* part) { return line.find(part) != line.npos; });
 }
 
-// Returns the page of the viewer without references to the service. `head` is inserted at the end
-// of the page's head.
+// Returns viewer.html without the lines for which is_of_service() is true. Inserts `head` at the
+// end of its element <head>.
 std::string page_with_head(const std::string& head) {
   std::istringstream lines(asset("viewer.html"));
   std::string page;
@@ -73,8 +74,9 @@ std::string percent_encoded(const std::string& text) {
   return result;
 }
 
-// `url` is the URL of the package (web/viewer/package/published.js), `script` the element with the
-// viewer.
+// Returns the content of the element <head> for the page of a package. `url` is the URL of the
+// folder of the package (web/viewer/package/published.js). `script` is the element <script> with
+// the viewer.
 std::string head_of(const std::string& title, const std::string& url, const std::string& script) {
   std::string head = "  <title>" + escaped(title) + "</title>\n";
   head += "  <meta name=\"voxdag-package\" content=\"" + url + "\">\n";

@@ -1,4 +1,4 @@
-// The files of the viewer for a package (query/package): its page and its modules.
+// The viewer of a package (query/package/package_index.h): its page and its JavaScript module.
 #pragma once
 
 #include <string>
@@ -8,12 +8,13 @@
 
 namespace voxdag::server {
 
-// Returns index.html and one module with all modules of the viewer. The page has the title and
-// finds the package in its folder.
+// Returns two files: index.html, and the module with the JavaScript of the viewer. The page has the
+// title `title` and shows the package in its own folder.
 std::vector<query::ViewerFile> viewer_site(const std::string& title);
 
-// Returns the page with the module in it. It finds the files of the package in the page, in
-// elements <script type="text/plain" data-file=NAME> with their base64.
+// Returns a page that contains the module of the viewer, for `publish --single-file`. It reads the
+// files of the package from elements <script type="text/plain" data-file=NAME> in the page, which
+// the caller must insert. These elements contain the bytes of the files in base64.
 std::string page_with_module(const std::string& title);
 
 }  // namespace voxdag::server

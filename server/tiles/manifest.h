@@ -24,8 +24,8 @@ struct GridPlace {
 nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string& digest,
                                    const GridPlace& place, std::optional<uint64_t> root);
 
-// Aspect ratios of the pictures for which the cameras of named views are chosen. Viewers compute
-// the cameras of other pictures from both.
+// Aspect ratios (width / height) of the pictures for which a manifest has the cameras of named
+// views. For a picture with another aspect ratio, a viewer computes the camera from both.
 inline constexpr double kWideAspect = 16.0 / 9, kTallAspect = 1.0 / 2;
 
 // Returns the camera of the named view of a DAG, which must not be empty. Throws the errors of
@@ -34,8 +34,8 @@ nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& vie
                                  const query::DagView& dag, const GridPlace& place,
                                  double aspect = kWideAspect);
 
-// Returns the manifest of a file. Computing the cameras may take a second, or longer if the file is
-// not in memory.
+// Returns the manifest of a file. It takes up to a second to compute the cameras, or longer if the
+// file must first be read from the disk.
 nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const query::DagView& dag,
                                      const std::string& digest, const CancelToken& cancel);
 

@@ -66,12 +66,13 @@ signOut.addEventListener("click", async () => {
   await request("GET", "/api/v1/jobs?limit=1").catch(() => {});
 });
 
-// Shows the version, and facts about the machine if the user may read them.
+// Shows the version of the service, and facts about its machine if the user may read them.
 async function showMachine() {
   const place = document.getElementById("version");
   const {version} = await getJson("/version");
   setText(place, `voxdag ${version}`);
-  // Without a token, a service with tokens would answer 401, and the login page would open.
+  // Uses fetch() and ignores errors: getJson() would open the login page if the service answers
+  // 401, because the user has no token.
   const response = await fetch("/api/v1/machine", {headers: authorization()});
   if (!response.ok) return;
   const machine = await response.json();

@@ -24,7 +24,7 @@ class AccessControl {
   // `needed` or for a wrong Host or Origin, and 429 above a rate limit.
   Caller admit(Request& request, Role needed);
 
-  // The pages of other origins that may use the API.
+  // Returns the rules for requests from web pages of other origins.
   const CrossOrigin& cross_origin() const { return cross_origin_; }
 
  private:

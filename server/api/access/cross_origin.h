@@ -1,5 +1,5 @@
 // Cross-origin requests (CORS): lets web pages of the origins in the setting `cors_origins` use the
-// API. Immutable.
+// API. Immutable after construction.
 #pragma once
 
 #include <string>
@@ -13,13 +13,16 @@ class CrossOrigin {
  public:
   explicit CrossOrigin(std::vector<std::string> origins) : origins_(std::move(origins)) {}
 
-  // True if the request is from a page of a listed origin.
+  // True if a page of a listed origin has sent the request.
   bool allows(const Request& request) const;
-  // True if the request is a browser's question whether such a page may send another request.
+  // True if the request is a preflight request: before a page of a listed origin sends its actual
+  // request, the browser asks whether the service allows it.
   bool is_preflight(const Request& request) const;
-  // Returns the answer to a preflight request.
+  // Returns the response to a preflight request. It allows all methods and header fields of the
+  // API.
   static Response preflight_response();
-  // Adds the headers that let the page read the answer, if allows(request).
+  // If allows(request), adds the header fields that let the page read the response. If any origin
+  // is listed, always adds "Vary", because responses then depend on the origin.
   void add_headers(const Request& request, Response& response) const;
 
  private:

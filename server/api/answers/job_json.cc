@@ -36,8 +36,9 @@ std::string links(const std::string& self) {
   return text + ",\"preview\":\"" + self + "/preview.png\"}";
 }
 
-// Returns the JSON members "scene", "resolution", "options" and "labels" of a stored request.
-// Leaves out any other members, which a damaged record may contain.
+// Returns the members "scene", "resolution", "options" and "labels" of a stored request as JSON
+// text without braces. If the stored request is damaged, missing members are empty or 0. Leaves out
+// all other members.
 std::string request_members(const std::string& request) {
   using nlohmann::ordered_json;
   const auto stored = ordered_json::parse(request, nullptr, false);

@@ -13,11 +13,13 @@ namespace {
 constexpr const char* kPagePolicy =
     "default-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
     "frame-ancestors ";
-// The page that other pages may show in a frame, and the query parameter for that.
+// The only page that pages of other origins may show in a frame, and the query parameter that such
+// a frame must have in its URL.
 constexpr const char* kViewerPage = "viewer.html";
 constexpr const char* kEmbed = "embed";
 
-// `ancestors` are the pages that may show the asset in a frame.
+// Returns the response with a file. `ancestors` is the value of "frame-ancestors" in its
+// Content-Security-Policy: the origins whose pages may show the file in a frame.
 Response get_asset(Call& call, const Asset& asset, const std::string& ancestors = "'none'") {
   Response response;
   response.headers.emplace("ETag", asset.etag);

@@ -178,7 +178,8 @@ Response consistent_response(const Call& call, const TileSource& dag, const Answ
   }
 }
 
-// Returns `manifest`, a JSON object, with the additional member "name" unless `name` is "".
+// Returns the JSON object `manifest` with the additional member "name". Returns it unchanged if
+// `name` is "".
 std::string with_name(const std::string& manifest, const std::string& name) {
   if (name.empty()) return manifest;
   return "{\"name\":" + nlohmann::json(printable_line(name)).dump() + "," + manifest.substr(1);

@@ -33,7 +33,7 @@ struct TileRoutes {
   std::string manifest_schema;
   Packing packing = Packing::kGzip;
   Colors colors = Colors::kServed;
-  std::string file_name = {};  // member "name" of the manifest; "": none
+  std::string file_name = {};  // "name" in the manifest; "": no such member
 };
 
 // Adds BASE/tiles, BASE/tiles/batch, BASE/tiles/{level}/{offset} and, if colors are served,

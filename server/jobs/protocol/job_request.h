@@ -16,7 +16,7 @@ struct JobRequest {
   int priority = 0;
   std::vector<std::string> scenes;  // names of uploads or absolute paths
   BuildSpec spec;                   // without scenes, output and work folder
-  std::string text;                 // JSON of scene, resolution, options and labels, as submitted
+  std::string text;                 // JSON with the submitted scene, resolution, options and labels
 };
 
 inline constexpr Field kPriorityField = Field("priority", "higher runs earlier").range(-100, 100);

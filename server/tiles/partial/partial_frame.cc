@@ -14,8 +14,8 @@ namespace {
 
 constexpr uint64_t kMaxPlanBytes = uint64_t{1} << 30;
 
-// Returns the planned subvolumes as solid parts, read from the subvolume list that the job's
-// process wrote to `path`.
+// Returns the planned subvolumes as solid cubes. `plan` is the subvolume list that the process of
+// the job has written to the file `path`; the messages of errors name this file.
 std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, const std::string& path,
                                             uint64_t resolution) {
   const uint32_t levels = levels_of_resolution(resolution);

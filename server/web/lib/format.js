@@ -101,7 +101,7 @@ export function hasEnded(state) {
   return ["canceled", "failed", "succeeded"].includes(state);
 }
 
-// Returns the labels of a job as text: "#a #b"; "" for none.
+// Returns the labels of a job as text, "#a #b", or "" if it has none.
 export function labelsText(job) {
   return (job.labels ?? []).map((label) => `#${label}`).join(" ");
 }

@@ -1,9 +1,10 @@
-// The progress of a job over all its stages.
+// Computes the progress of a job over all its stages.
 
 import {hasEnded} from "./format.js";
 
-// Stages of a job in their order, with their typical shares of its time. `applies` tells whether a
-// job with these options has the stage. Other stages are short and count as the stage before them.
+// The long stages of a job, in their order. `share` is the typical time of a stage, relative to the
+// other stages. applies(options) returns true if a job with these options has the stage. All other
+// stages are short; while one of them runs, the progress does not change.
 const kStages = [
   {name: "ingest", share: 10, applies: () => true},
   {name: "build", share: 60, applies: () => true},
@@ -13,8 +14,8 @@ const kStages = [
   {name: "write", share: 5, applies: () => true},
 ];
 
-// Returns {fraction, leftS} of a job: its completed fraction, 0 to 1, and an estimate of the
-// remaining seconds. Each is null if it is unknown.
+// Returns {fraction, leftS}: the completed fraction of a job, 0 to 1, and an estimate of the
+// remaining seconds. A value is null if it is unknown.
 export function jobProgress({state, progress, options}) {
   if (state === "succeeded") return {fraction: 1, leftS: null};
   const stages = kStages.filter(({applies}) => applies(options ?? {}));
@@ -35,7 +36,7 @@ export function jobProgress({state, progress, options}) {
   };
 }
 
-// Shows the progress of a job in a meter of views/parts.js.
+// Shows the progress of a job in `bar`, a meter of views/parts.js.
 export function updateJobMeter(bar, job) {
   const {fraction} = jobProgress(job);
   const waits = job.state === "queued" || job.state === "suspended" || hasEnded(job.state);

@@ -130,8 +130,8 @@ class JobPage {
     this.cubes.update(this.job);
   }
 
-  // Hides the cards that have nothing to show because the job ended before. The log of a failed job
-  // is next to its error, and open.
+  // Hides the cards that will never have anything to show, because the job has ended. If the job
+  // has failed, moves its log next to the error and opens it.
   showParts(job) {
     const ended = hasEnded(job.state), stages = job.progress?.stages ?? [];
     this.rateCard.hidden = this.rate.empty && ended;

@@ -1,6 +1,6 @@
-// The list of all jobs with a search and a filter by state: running jobs first, then all others,
-// newest first. The list is refreshed every two seconds while a job on the page has not ended, and
-// every eight seconds otherwise.
+// The list of all jobs, which can be searched and filtered by state. Running jobs are first, and
+// then all others, newest first. The page refreshes the list every two seconds while it shows a job
+// that has not ended, and every eight seconds otherwise.
 
 import {getJson, poll} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
@@ -75,7 +75,8 @@ export function jobsPage(_, query, signal) {
   };
 }
 
-// Returns the address of the list for these parameters, of which empty ones are left out.
+// Returns the URL fragment of the list with these parameters. Leaves out parameters with empty
+// values.
 function addressOf(parameters) {
   const given = Object.entries(parameters).filter(([, value]) => value);
   return `#/${given.length ? "?" : ""}${new URLSearchParams(given)}`;

@@ -21,16 +21,17 @@ import {Panel} from "./panel.js";
 import {length, subtract} from "./vector.js";
 
 const kDefaultFov = 35;
-const kSeenIntervalMs = 250;  // between two measurements of the visible distance
-const kFirstSeenMs = 2000;    // delay of the first pick, which compiles shaders
+const kSeenIntervalMs = 250;  // time between two picks that measure the visible distance
+const kFirstSeenMs = 2000;    // delay of the first of these picks, which compiles shaders
 const kStatisticsIntervalMs = 500;
 const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` need not be started yet. `places` are the elements {panel, tools, status}. If
-  // `bookmarks` is true, camera motions update the fragment of the page's address. `isKeyed` is
-  // true if a key has opened the viewer. The viewer ends when `signal` aborts.
+  // `renderer` may be started later. `places` has the elements {panel, tools, status}. If
+  // `bookmarks` is true, the viewer stores the camera in the fragment of the URL after it has
+  // moved. `isKeyed` is true if the user has opened the viewer with the keyboard. The viewer ends
+  // when `signal` aborts.
   constructor(
       {canvas, renderer, manifest, places, fileName, signal, bookmarks = true, isKeyed = false}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
@@ -106,7 +107,8 @@ export class Viewer {
     return name ? this.namedPlacement(name) : this.space.placement(camera);
   }
 
-  // Returns the placement of a named view that shows the complete scene in the canvas.
+  // Returns the placement of the camera for the view `name`, such that the complete scene is
+  // visible in the canvas.
   namedPlacement(name) {
     const {camera, views = {iso: camera}, tall_views: tall = {}, box} = this.manifest;
     const {clientWidth, clientHeight} = this.canvas;
@@ -169,7 +171,7 @@ export class Viewer {
       this.canvas.focus();
     });
     dialog.showModal();
-    dialog.scrollTop = 0;  // the focus on the button at the end has scrolled the dialog
+    dialog.scrollTop = 0;  // showModal() focuses the last button, and so scrolls down
   }
 
   resize() {

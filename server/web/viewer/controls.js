@@ -11,7 +11,7 @@ const kDoubleTimeMs = 350;
 const kDoubleMovePx = 24;
 const kWheelZoom = 0.0016;  // per pixel of the wheel
 const kAnchorTimeMs = 400;  // wheel events within this time zoom to the same point
-const kAnchorSteps = 6;     // picks between the cursor and the center, if the cursor is on the sky
+const kAnchorSteps = 6;     // maximum picks after the first one, if the cursor is on the sky
 const kLinePx = 20;         // pixels per line of a wheel event
 const kRecentMs = 80;       // inertia starts with the mean speed in this last part of a drag
 
@@ -164,9 +164,10 @@ export class Controls {
     else this.handlers.onClick(...at);
   }
 
-  // Zooms to the surface under the cursor. If the cursor is on the sky, zooms to the first surface
-  // between the cursor and the center of the picture, or to the target if there is none. Until the
-  // surface is known, only collects the zoom: a zoom toward the sky could leave the scene.
+  // Zooms toward the surface under the cursor. If the cursor is on the sky, zooms toward the first
+  // surface on the line from the cursor to the center of the picture. If only sky is on this line,
+  // zooms toward the target of the camera. A zoom toward the sky could leave the scene. So until
+  // the surface is known, wheel events only add to the zoom factor.
   handleWheel(event) {
     event.preventDefault();
     const at = this.position(event);
@@ -200,7 +201,8 @@ export class Controls {
     });
   }
 
-  // Resolves to the first surface on the way from `at` to the center of the picture; null for none.
+  // Picks points of the picture from `at` to the center. Resolves to the position of the first
+  // surface, or to null if no pick hits a surface.
   async nearestSurface(at) {
     const center = this.size.map((c) => c / 2);
     for (let step = 0; step <= kAnchorSteps; ++step) {

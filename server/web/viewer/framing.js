@@ -1,17 +1,22 @@
-// Adapts the camera of a named view to the shape of the picture.
+// Adapts the camera of a named view to the aspect ratio of the picture.
 
 import {add, dot, normalize, scale, subtract} from "./vector.js";
 
-// Aspect ratios for which the manifest has cameras: `views` and `tall_views`.
+// Aspect ratios (width / height) of the cameras in the manifest: kWideAspect for `views`,
+// kTallAspect for `tall_views`.
 const kWideAspect = 16 / 9, kTallAspect = 1 / 2;
 
-// Returns the placement of a view that shows the complete scene in a picture with this aspect
-// ratio. `wide` and `tall` are the view's placements for kWideAspect and kTallAspect. `box` is the
-// scene's box. All positions are in voxels.
+// Returns a placement of the camera that shows the complete scene in a picture with this aspect
+// ratio. `wide` and `tall` are the placements of the same view for kWideAspect and kTallAspect.
+// `box` is the box of the scene. All positions are in voxels.
 //
-// A point fits the picture's width if the eye is at least s + x / aspect away, where s is the
-// point's position along the view and x depends on its position across the view. So the distance
-// for one aspect ratio limits the distance for another one, if s is limited by the box.
+// The view direction is fixed, so only the distance of the eye changes. Let s be the position of a
+// point of the scene on the axis from the target to the eye. The point fits the width of the
+// picture if the eye is at s + x / aspect or beyond, where x depends only on the position of the
+// point across this axis. For a smaller aspect ratio than kTallAspect, the eye must move back, and
+// a point with the lowest s moves it the most. For a larger one, the eye may move forward, and a
+// point with the highest s allows the least. The points that touch the sides of the picture are
+// unknown, so `limit`, the lowest or highest s of the box, replaces their s.
 export function framed(wide, tall, box, aspect) {
   if (!tall || !box || aspect >= kWideAspect) return wide;
   const back = normalize(subtract(wide.eye, wide.target));

@@ -1,10 +1,11 @@
-// Marks a canvas that is used by keys with the class "keyed". Its focus frame and the dot in its
-// center are shown only then. The selector :focus-visible is not sufficient: it also matches after
-// a script has moved the focus to the canvas because of a click.
+// Gives a canvas the class "keyed" while the user uses keys. Only then, the style sheet shows the
+// focus frame and the dot in the center of the canvas. The selector :focus-visible would not be
+// sufficient: it also matches if a script has moved the focus to the canvas because of a click.
 
 const kModifiers = ["Shift", "Control", "Alt", "Meta"];
 
-// `isKeyed`: true if a key has opened the viewer.
+// `isKeyed` is the initial state: true if the user has opened the viewer with the keyboard. Stops
+// when `signal` aborts.
 export function markKeyUse(canvas, isKeyed, signal) {
   const mark = (keyed) => canvas.classList.toggle("keyed", keyed);
   mark(isKeyed);

@@ -1,6 +1,8 @@
-// The page of the viewer. viewer.html?job=ID shows a job of the service; viewer.html without a job
-// shows the file of `voxdag view`. ?budget=MiB limits the memory of tiles and colors. ?embed shows
-// only the picture, for a frame in another page.
+// The page of the viewer. Query parameters of viewer.html:
+//
+//     job=ID       shows a job of the service; without it, shows the file of `voxdag view`
+//     budget=MiB   limits the memory of tiles and colors
+//     embed        shows only the picture, for a frame in another page
 
 import {authorization, getJson, Problem, sleep, token} from "../lib/api.js";
 import {announce, clear, h, setText} from "../lib/dom.js";
@@ -47,7 +49,8 @@ function hideMessage() {
   place("message").hidden = true;
 }
 
-// Shows the title of the page, and below it the size of the file with this manifest.
+// Shows the title of the page. If `manifest` is given, also shows the resolution and the number of
+// voxels of its file.
 function showTitle(title, manifest = null) {
   const facts = manifest && [
     gridText(manifest.resolution), manifest.voxels && `${countText(manifest.voxels)} voxels`
@@ -56,7 +59,8 @@ function showTitle(title, manifest = null) {
   clear(place("title"), title, facts && h("span", {class: "title-facts"}, facts.join(" · ")));
 }
 
-// Shows a link to the complete page over the picture of a frame.
+// Adds a link over the picture of a framed viewer. The link opens the viewer without the frame,
+// with the current camera.
 function addWindowLink() {
   const address = new URL(location.href);
   address.searchParams.delete("embed");

@@ -1,16 +1,17 @@
-// The source of tiles of a page that shows no job. Pages of `voxdag publish` set a source before
-// they load the other modules; all other pages use the server of `voxdag view`.
+// The source of tiles for a page that does not show a job. A page of `voxdag publish` calls
+// setPublished() before it loads the other modules. All other pages read tiles from the server of
+// `voxdag view`.
 
 import {TileSource} from "./tile_source.js";
 
 let makePublished = null;
 
-// Makes the page use the sources that makeSource() returns.
+// Makes sourceOfPage() return makeSource(), the source of a package.
 export function setPublished(makeSource) {
   makePublished = makeSource;
 }
 
-// True if `voxdag publish` has written the page.
+// True if the page shows a package of `voxdag publish`.
 export function isPublished() {
   return makePublished !== null;
 }

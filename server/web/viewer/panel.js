@@ -169,8 +169,8 @@ export class Panel {
   }
 }
 
-// Returns `text` as elements that break into lines only after spaces and commas, never in a number
-// or a name.
+// Returns elements that show `text`. The browser can break lines only after spaces and commas,
+// never in a number or a name.
 function breakable(text) {
   return text.split(/(?<=[ ,])/)
       .flatMap(

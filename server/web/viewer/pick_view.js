@@ -49,7 +49,7 @@ export class PickView {
     return this.space.resolution / 2 ** level;
   }
 
-  // Returns the place of a pick in scene units.
+  // Returns the position of a pick in scene units, as text.
   sceneText(pick) {
     return this.space.text(pick.position).replaceAll(",", ", ");
   }

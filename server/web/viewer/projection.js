@@ -1,22 +1,24 @@
-// Projects points and lines of the grid to the picture of a camera.
+// Projects points and lines of the grid to a picture.
 
 import {dot, subtract} from "./vector.js";
 
 export class Projection {
-  // `width` and `height` are the size of the picture. Lines nearer to the eye than `near` voxels
-  // are cut off.
+  // `width` and `height` are the size of the picture in pixels. Parts of lines that are less than
+  // `near` voxels in front of the eye are cut off.
   constructor(camera, width, height, near = 1e-6) {
     Object.assign(this, camera.axes(), {eye: camera.eye, width, height, near});
     this.pixel = camera.pixelSpread(height);
   }
 
-  // Returns [x, y], from the upper left corner of the picture; null for a point behind the eye.
+  // Returns the pixel [x, y] at which a point is visible, from the upper left corner of the
+  // picture; null if the point is behind the eye.
   point(position) {
     const place = this.place(position);
     return place[2] >= this.near ? this.toPixels(place) : null;
   }
 
-  // Returns the ends [x, y] of a line's part in front of the eye; null if there is no such part.
+  // Returns the two ends [x, y] of the part of a line that is in front of the eye; null if there is
+  // no such part.
   line(from, to) {
     let a = this.place(from), b = this.place(to);
     if (a[2] < this.near && b[2] < this.near) return null;

@@ -1,4 +1,4 @@
-// Actions on the selected jobs of a list.
+// Buttons for actions on several selected jobs of a list.
 
 import {sendJson} from "../lib/api.js";
 import {announce, clear, confirmAction, h, setText} from "../lib/dom.js";
@@ -6,7 +6,8 @@ import {hasEnded} from "../lib/format.js";
 
 import {problemBox} from "./parts.js";
 
-// Each action: its name, the states it applies to, the request for a job, and the button's class.
+// The actions. applies(job) returns true if the action is possible in the state of the job.
+// request(job) sends the request. `kind` is the CSS class of the button.
 const kActions = [
   {
     name: "Cancel",
@@ -29,7 +30,7 @@ const kActions = [
 ];
 
 export class BulkActions {
-  // reload() is called after an action.
+  // reload() reloads the list; it is called after each action.
   constructor(reload) {
     this.reload = reload;
     this.selected = new Map();  // job id -> job
@@ -48,7 +49,7 @@ export class BulkActions {
     this.element = h("div", {}, this.bar, this.error);
   }
 
-  // Returns a checkbox that selects a job.
+  // Returns a checkbox that selects the job. `title` is the name of the job.
   checkbox(job, title) {
     const box = h("input", {type: "checkbox", "aria-label": `Select ${title}`});
     box.addEventListener("change", () => {
@@ -59,8 +60,8 @@ export class BulkActions {
     return box;
   }
 
-  // Updates the selected jobs from the jobs of the list. Jobs that left the list are not selected
-  // any more.
+  // Replaces the selected jobs by their current state in `jobs`, the jobs of the list. Jobs that
+  // are no longer in the list are deselected.
   update(jobs) {
     const byId = new Map(jobs.map((job) => [job.id, job]));
     for (const id of [...this.selected.keys()])
@@ -80,8 +81,8 @@ export class BulkActions {
     });
   }
 
-  // Runs the action for one job after the other, so that a service is not flooded. Ends at the
-  // first error.
+  // Runs the action for all selected jobs to which it applies, one job after the other so that the
+  // service does not get many requests at the same time. Stops at the first error.
   async run({name, applies, request}) {
     const jobs = [...this.selected.values()].filter(applies);
     const what = jobs.length === 1 ? "this job" : `${jobs.length} jobs`;

@@ -1,4 +1,5 @@
-// The progress of a job over all stages, its current stage, and the numbers of its attempt.
+// Shows the progress of a job over all stages, its current stage, and numbers of its current
+// attempt.
 
 import {h, setText} from "../lib/dom.js";
 import {countText, durationText, hasEnded, shortCount, sizeText, unitText} from "../lib/format.js";
@@ -45,7 +46,7 @@ export class ProgressView {
   }
 }
 
-// Returns the text about the job as a whole: "42 %, about 3 m 20 s left".
+// Returns the text about the progress over all stages, such as "42 %, about 3 m 20 s left".
 function wholeText({fraction, leftS}) {
   if (fraction === null) return "";
   return percentText(fraction) + (leftS > 0 ? `, about ${durationText(leftS)} left` : "");

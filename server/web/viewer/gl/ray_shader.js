@@ -66,9 +66,9 @@ uint entered_count = 0u, entered_slot = 0u;  // slot of a random tile among all 
 uniform int u_wire_scale;  // scale of the cubes whose edges are drawn; -1: none
 uniform float u_wire_width;  // half the width of a line at distance 1
 uniform vec2 u_wire_fade;     // distance at which lines begin to fade, and 1 / length of the fade
-float wire = 0.0;  // how strongly the pixel shows a line, 0 to 1
-const float kFront = 0.4;                   // share of a line in front of a nearer-to-surface cube
-const float kHidden = 4.0, kClear = 20.0;  // widths in pixels of cubes without and with clear lines
+float wire = 0.0;  // opacity of the lines at the pixel, 0 to 1
+const float kFront = 0.4;                   // factor of opacity for each further cube behind a line
+const float kHidden = 4.0, kClear = 20.0;  // cube edges in pixels: no lines below, full lines above
 #endif
 #ifdef CELL
 ivec3 hit_cell = ivec3(0);   // low corner of the cell that was hit
@@ -106,9 +106,10 @@ void note_tile(uint slot) {
 }
 
 #ifdef WIRE
-// Updates wire when the ray enters an occupied cell. A line is near an edge of the cell's face.
-// Lines fade with their distance, where cubes are only a few pixels wide, and in front of further
-// cubes, because they would hide the surface otherwise.
+// Updates ` wire` when the ray enters an occupied cell of the scale u_wire_scale. The ray hits a
+// line if it enters close to an edge of the cell's face. Lines fade with their distance, and where
+// cubes are only a few pixels wide. They also fade with each further cube that the ray enters
+// behind them, because they would hide the surface otherwise.
 void note_wire(ivec3 position, int scale, int axis, float t) {
   if (scale != u_wire_scale || axis < 0) return;
   wire *= kFront;

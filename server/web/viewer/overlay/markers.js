@@ -1,5 +1,5 @@
-// Elements over the picture: marks at the picked voxel and at the first point of a measurement, the
-// measured line with its length, and the card at the picked voxel.
+// The elements over the picture: a mark at the picked voxel, a mark at the start of a measurement,
+// the line between the two with its length, and the card next to the picked voxel.
 
 import {h, setText, svg} from "../../lib/dom.js";
 import {Projection} from "../projection.js";
@@ -7,7 +7,7 @@ import {Projection} from "../projection.js";
 import {PickCard} from "./pick_card.js";
 
 export class Markers {
-  // `picks` is the PickView whose picks are shown.
+  // `picks` is the PickView (pick_view.js) that has the picked voxel and the start.
   constructor(canvas, picks) {
     Object.assign(this, {canvas, picks});
     this.marks = ["picked", "start"].map(
@@ -39,7 +39,7 @@ export class Markers {
     this.showLine(pick && start ? projection.line(start.position, pick.position) : null);
   }
 
-  // Draws the line between two points of the picture; null: none.
+  // Draws the measured line between `ends`, two points of the picture. Hides it if `ends` is null.
   showLine(ends) {
     this.drawing.style.display = ends ? "" : "none";
     this.label.hidden = !ends;

@@ -1,14 +1,15 @@
-// The card next to the picked voxel: its place, and the length of a measurement. Phones show it
-// above the closed panel.
+// The card next to the picked voxel. It shows the position of the voxel and the length of a
+// measurement. On phones, it is above the closed panel.
 
 import {clear, h} from "../../lib/dom.js";
 import {countText} from "../../lib/format.js";
 
-const kGapPx = 14;    // between the voxel and the card
-const kMarginPx = 8;  // between the card and the edge of the picture
+const kGapPx = 14;    // distance between the voxel and the card
+const kMarginPx = 8;  // minimum distance between the card and the edge of the picture
 
 export class PickCard {
-  // `picks` is the PickView. focusPicture() is called when a button of the card disappears.
+  // `picks` is the PickView (pick_view.js). The card calls focusPicture() after a click on a button
+  // has removed the button, because the button had the focus.
   constructor(picks, focusPicture) {
     Object.assign(this, {picks, focusPicture});
     this.element =
@@ -16,8 +17,9 @@ export class PickCard {
     this.shown = [];
   }
 
-  // Moves the card next to the point `at` of a picture of this size. Hides it if `at` is null.
-  // Keeps the point `from` visible, at which a measurement starts; null: none.
+  // Moves the card next to the picked voxel, which is at the point `at` in a picture of this size.
+  // If `at` is null, hides the card. `from` is the point at which a measurement starts, or null;
+  // the card is on the other side of the voxel if it fits there, so that the line remains visible.
   place(at, from, width, height) {
     const {pick, start} = this.picks, {element} = this;
     element.hidden = !at;
@@ -25,7 +27,7 @@ export class PickCard {
     if (this.shown[0] !== pick || this.shown[1] !== start) this.fill(pick, start);
     const {offsetWidth, offsetHeight} = element;
     const [x, isNextTo] = sideOf(at[0], offsetWidth, width, from !== null && from[0] > at[0]);
-    // A card that is too wide for both sides is above or below the voxel.
+    // If the card fits neither to the left nor to the right of the voxel, it is above or below it.
     const above = at[1] - kGapPx - offsetHeight, isFree = !from || from[1] >= at[1];
     const y = isNextTo               ? at[1] - offsetHeight / 2 :
         isFree && above >= kMarginPx ? above :
@@ -48,7 +50,8 @@ export class PickCard {
         start === pick && h("p", {}, "Pick another voxel."), start !== pick && this.buttons(start));
   }
 
-  // The buttons are missing while the second voxel is to be picked, which may be below them.
+  // Returns the buttons of the card. The card has no buttons while the user picks the second voxel
+  // of a measurement, because they could cover this voxel.
   buttons(start) {
     const {picks} = this;
     return h(
@@ -71,15 +74,17 @@ export class PickCard {
           "×"));
   }
 
-  // Runs the action of a button, which replaces the buttons.
+  // Runs the action of a button. The action replaces all buttons, so the focus then moves to the
+  // picture.
   act(run) {
     run();
     this.focusPicture();
   }
 }
 
-// Returns where a card of this width is in a picture, and whether it is next to the column `at`:
-// on its right or on its left, or in the middle of the picture if it fits on neither side.
+// Returns [x, isNextTo]. x is the left edge of a card with the width `size`, for a voxel at the
+// column `at` of a picture with this width. isNextTo is true if the card fits to the right or to
+// the left of the voxel; otherwise, the card is in the middle of the picture.
 function sideOf(at, size, width, prefersLeft) {
   const right = at + kGapPx, left = at - kGapPx - size;
   const fits = {[right]: right + size + kMarginPx <= width, [left]: left >= kMarginPx};

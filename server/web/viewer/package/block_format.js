@@ -1,5 +1,5 @@
-// Decodes the blocks of a package (docs/format.md, "Packages"). Blocks come from the network. Every
-// count is checked, so a damaged block is an error.
+// Decodes the blocks of a package (docs/format.md, "Packages"). Blocks come from the network and
+// may be damaged. All counts in them are checked, so a damaged block causes an error.
 
 const kTileMagic = 0x31544456;
 const kReferenceBytes = 4;
@@ -10,7 +10,7 @@ const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   return bits;
 });
 
-// Reads the columns of a block.
+// Reads the columns of a block one after the other. Throws an error after the end of the block.
 class Columns {
   constructor(bytes) {
     this.bytes = bytes;
@@ -21,7 +21,8 @@ class Columns {
     this.at += count;
     return this.bytes.subarray(this.at - count, this.at);
   }
-  // Reads `count` numbers of 32 bits. The column of the lowest bytes comes first.
+  // Reads `count` numbers of 32 bits from four columns of bytes. The first column has the lowest
+  // byte of each number.
   takeWords(count) {
     const words = new Uint32Array(count);
     for (let byte = 0; byte < kReferenceBytes; ++byte) {
@@ -35,15 +36,17 @@ class Columns {
   }
 }
 
-// A block of tiles. Makes the words of a tile (docs/format.md, "Tiles") when they are needed.
+// A block of tiles. Stores the block in expanded form, and makes the words of a tile
+// (docs/format.md, "Tiles") when they are requested.
 export class TileBlock {
-  // `shape` is the tileShape() of the level. `count` is the number of tiles in the block.
+  // `bytes` is the decompressed block. `level` is the level of the roots of the tiles. The third
+  // argument is the tileShape() of this level. `count` is the number of tiles.
   constructor(bytes, level, {levels, bricks}, count) {
     const columns = new Columns(bytes), head = columns.take(4);
     Object.assign(this, {level, levels, bricks, count});
     this.size = bytes.length;
-    this.masks = [];   // by level: the child masks of all nodes
-    this.starts = [];  // by level: the index of each tile's first node; at the end, of its leaves
+    this.masks = [];   // by level of the tiles: the child masks of all nodes
+    this.starts = [];  // by level: the index of each tile's first node; last: of its first leaf
     let starts = Uint32Array.from({length: count + 1}, (_, i) => i);
     for (let i = 0; i < levels; ++i) {
       const masks = columns.take(starts[count]);
@@ -60,7 +63,8 @@ export class TileBlock {
     columns.expectEnd();
   }
 
-  // Returns the words of tile `index` of the block. Equal nodes and leaves occur once.
+  // Returns the words of tile `index` of the block. Equal nodes and equal leaves of the tile are
+  // stored once.
   tile(index) {
     const {levels, bricks} = this, leaves = [];
     let children = this.leavesOf(index, leaves);
@@ -91,8 +95,8 @@ export class TileBlock {
     return words;
   }
 
-  // Adds the distinct leaves of a tile to `leaves`, as indexes in the block. Returns the index in
-  // `leaves` of each leaf of the tile.
+  // Adds the distinct leaves of a tile to `leaves`. A leaf is represented by its index in the
+  // block. Returns a list with, for each leaf of the tile, its index in `leaves`.
   leavesOf(index, leaves) {
     const starts = this.starts[this.levels], {low, high, numbers} = this, indexes = [];
     for (let leaf = starts[index]; leaf < starts[index + 1]; ++leaf) {
@@ -105,8 +109,9 @@ export class TileBlock {
     return indexes;
   }
 
-  // Adds the distinct nodes of a level of a tile to `nodes`, as [mask, ...indexes of children].
-  // Returns the index in `nodes` of each node.
+  // Adds the distinct nodes on one level of a tile to `nodes`, as [mask, ...indexes of its
+  // children]. `children` has these indexes for all nodes of the level. Returns a list with, for
+  // each node of the level, its index in `nodes`.
   nodesOf(index, level, children, nodes) {
     const masks = this.masks[level], starts = this.starts[level], indexes = [];
     let from = 0;
@@ -135,7 +140,8 @@ function childStarts(masks, starts) {
   return children;
 }
 
-// Returns the numbers of the cut-off nodes. `next` is the first new number.
+// Returns the tile number of each leaf; the leaves are cut-off nodes. `next` is the number of the
+// first new reference in the block.
 function readNumbers(columns, count, next) {
   const old = columns.take(Math.ceil(count / 8)), numbers = new Uint32Array(count);
   const isOld = (i) => old[i >>> 3] >>> (i & 7) & 1;
@@ -154,7 +160,8 @@ function readNumbers(columns, count, next) {
   return numbers;
 }
 
-// Returns the color pages of a block: Morton code of the page's position -> words of the page.
+// Returns the color pages of a block as a Map from the Morton code of the position of a page to the
+// words of the page.
 export function decodeColorBlock(bytes) {
   const words = new Uint32Array(bytes.slice().buffer, 0, bytes.length >>> 2), count = words[0];
   let at = 1 + 3 * count;
@@ -172,8 +179,9 @@ export function decodeColorBlock(bytes) {
   return pages;
 }
 
-// Returns the Morton code of a page's position. Codes have up to 51 bits, so they are computed
-// without 32-bit operations.
+// Returns the Morton code of the position of a page. The code has up to 51 bits. JavaScript has
+// exact integers of 53 bits, but shifts only of 32 bits, so the code is computed with
+// multiplications.
 export function mortonCode([x, y, z]) {
   let code = 0;
   for (let bit = 16; bit >= 0; --bit)
@@ -181,7 +189,8 @@ export function mortonCode([x, y, z]) {
   return code;
 }
 
-// Resolves to the decompressed bytes. Rejects if they do not match their checksum.
+// Decompresses a gzip file. Resolves to the decompressed bytes. Rejects if the checksum in the file
+// does not match them.
 export async function gunzip(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Uint8Array(await new Response(stream).arrayBuffer());

@@ -1,5 +1,5 @@
-// The directory of a package: the places of its blocks. Small directories are fetched in one piece,
-// and large ones page by page.
+// The directory of a package (docs/format.md, "Packages"): it tells where each block is stored. A
+// small directory is fetched in one piece, a large one page by page.
 
 import {TileError} from "../tile_source.js";
 
@@ -13,9 +13,9 @@ export class Directory {
     Object.assign(this, {files, bands, packs});
     this.file = {name: directory.name, bytes: directory.bytes};
     this.pages = directory.pages;
-    this.loaded = new Map();  // page -> promise of its entries
+    this.loaded = new Map();  // page -> promise of the result of parse()
     this.blockCount = 0;
-    this.firstBlocks = [];  // by band
+    this.firstBlocks = [];  // by band: its first block
     for (const {blocks} of bands) {
       this.firstBlocks.push(this.blockCount);
       this.blockCount += blocks;
@@ -23,17 +23,19 @@ export class Directory {
     let at = 0;
     this.offsets = this.pages.map(({bytes}) => (at += bytes) - bytes);
     at = 0;
-    this.packBlocks = packs.map(({blocks}) => (at += blocks) - blocks);  // first block of each pack
+    this.packBlocks = packs.map(({blocks}) => (at += blocks) - blocks);  // by pack: its first block
   }
 
-  // Resolves to the place of a block: {pack, offset, bytes}.
+  // Resolves to {pack, offset, bytes}: the pack of a block, its offset in the pack, and its
+  // compressed size.
   async place(block, options) {
     const page = Math.floor(block / kPageBlocks), entries = await this.page(page, options);
     const i = block - page * kPageBlocks;
     return {pack: entries.packs[i], offset: entries.offsets[i], bytes: entries.lengths[i]};
   }
 
-  // Resolves to the block of a band that has the color page with this code, if the band has it.
+  // Resolves to the only block of a color band that may contain the page with the Morton code
+  // `code`: the last block whose first code is not larger.
   async colorBlock(band, code, options) {
     const begin = this.firstBlocks[band], end = begin + this.bands[band].blocks;
     const lastPage = Math.floor((end - 1) / kPageBlocks);
@@ -71,7 +73,8 @@ export class Directory {
     }
   }
 
-  // Returns {packs, offsets, lengths, codes}, which have an entry for each block of the page.
+  // Returns {packs, offsets, lengths, codes}, arrays with an element for each block of a page of
+  // the directory. `bytes` is the decompressed page.
   parse(page, bytes) {
     const first = page * kPageBlocks, count = Math.min(kPageBlocks, this.blockCount - first);
     const isColor = this.colorFlags(first, count), colored = isColor.reduce((sum, c) => sum + c, 0);

@@ -1,5 +1,5 @@
-// The files of a package that are part of the page itself (`voxdag publish --single-file`). Has the
-// functions of PackageFiles.
+// Reads the files of a package from the page itself, into which `voxdag publish --single-file` has
+// written them. Has the same functions as PackageFiles.
 
 import {TileError} from "../tile_source.js";
 
@@ -31,6 +31,6 @@ function decode(name) {
   const element = document.querySelector(`script[data-file="${CSS.escape(name)}"]`);
   if (!element) throw new TileError(404, `The page does not contain ${name}.`);
   const text = atob(element.textContent);
-  element.remove();  // the bytes replace the text in memory
+  element.remove();  // frees the memory of the text
   return Uint8Array.from(text, (character) => character.charCodeAt(0));
 }

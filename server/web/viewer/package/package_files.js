@@ -1,24 +1,24 @@
 // Reads the files of a package from a web server.
 //
-// Many servers answer requests for ranges with the complete file, with an error, or with a range of
-// the compressed file. So a range is used only if its length and position are right. As soon as a
-// range is not, all files are fetched completely.
+// Many servers do not answer a range request with the range: they send the complete file, an error,
+// or a range of the compressed file. So the length and the position of each answer are checked.
+// After the first wrong answer, all files are fetched completely.
 
 import {TileError} from "../tile_source.js";
 
-const kTimeoutMs = 30000;         // maximum time between two pieces of an answer
+const kTimeoutMs = 30000;         // maximum time without new data of an answer
 const kSmallFile = 256 * 1024;    // files up to this size are fetched completely
-const kMaxWholeBytes = 64 << 20;  // limit for complete files in memory, except the newest
-const kMaxRequests = 6;           // concurrent requests
+const kMaxWholeBytes = 64 << 20;  // limit for complete files in memory; the newest may exceed it
+const kMaxRequests = 6;           // maximum number of concurrent requests
 
 export class PackageFiles {
-  // `base`: the URL of the package's folder, with a slash at its end.
+  // `base` is the URL of the folder of the package. It must end with a slash.
   constructor(base) {
     this.base = base;
     this.timeoutMs = kTimeoutMs;
-    this.hasRanges = true;         // false after the server has failed to send a range
-    this.rangesAreProven = false;  // true after the contents of a range were right
-    this.whole = new Map();        // name -> promise of the bytes, most recently used last
+    this.hasRanges = true;         // false after a wrong answer to a range request
+    this.rangesAreProven = false;  // true after a range had the right header field or contents
+    this.whole = new Map();        // complete files: name -> promise of bytes, last used last
     this.wholeBytes = 0;
     this.fetchedBytes = 0;
     this.requestCount = 0;
@@ -26,13 +26,14 @@ export class PackageFiles {
     this.waiting = [];
   }
 
-  // Resolves to the text of a file whose contents may change.
+  // Resolves to the text of a file. The file may change on the server, so the browser must not use
+  // a cached copy without asking the server.
   async text(name, signal) {
     const {bytes} = await this.request(name, {cache: "no-cache", signal});
     return new TextDecoder().decode(bytes);
   }
 
-  // Resolves to a part of a file {name, bytes}. Throws TileError.
+  // Resolves to the bytes [offset, offset + length) of the file {name, bytes}. Throws TileError.
   async read(file, offset, length, {signal, cache} = {}) {
     const isSmall = file.bytes <= kSmallFile || length === file.bytes;
     if (this.hasRanges && !isSmall && !this.whole.has(file.name)) {
@@ -43,10 +44,11 @@ export class PackageFiles {
     return (await this.readWhole(file, {signal, cache})).subarray(offset, offset + length);
   }
 
-  // Resolves to a range; to null if the server does not send ranges.
+  // Resolves to a range of a file, fetched by a range request. Resolves to null if the server does
+  // not answer with this range.
   async readRange(file, offset, length, {signal, cache}) {
-    // Until a range has arrived, other requests wait: a server without ranges would answer each of
-    // them with the complete file.
+    // Until a range request has succeeded, all others wait for it: a server without ranges would
+    // answer each of them with the complete file.
     if (!this.rangesAreProven) {
       while (this.probe) await this.probe;
       if (!this.hasRanges) return null;
@@ -58,7 +60,8 @@ export class PackageFiles {
     try {
       answer = await reads;
     } catch (error) {
-      // A proxy may have broken the answer, or another origin may have refused the header field.
+      // These errors can mean that the server, a proxy, or the rules for other origins (CORS)
+      // reject range requests. Then all files are fetched completely.
       const isRefused = error.status === 416 || (error.status === 0 && !error.timedOut);
       if (!isRefused || this.rangesAreProven || signal?.aborted) throw error;
     } finally {
@@ -108,7 +111,8 @@ export class PackageFiles {
     this.wholeBytes -= reads.fileBytes;
   }
 
-  // Resolves to {status, range, bytes} of a successful answer. Throws TileError.
+  // Fetches a file. Resolves to {status, range, bytes} of a successful answer; `range` is the
+  // header field Content-Range, or null. Throws TileError.
   async request(name, {headers, cache, signal} = {}) {
     while (this.running >= kMaxRequests) await new Promise((resolve) => this.waiting.push(resolve));
     this.running++;
@@ -153,8 +157,9 @@ export class PackageFiles {
   }
 }
 
-// True if the answer is the requested range. Servers of other origins may hide Content-Range; the
-// checksums of the blocks then detect a wrong range.
+// True if the answer has the length and, as far as known, the position of the requested range. A
+// server of another origin may hide Content-Range; then the checksums of the blocks detect a wrong
+// range.
 function isRange({range, bytes}, file, offset, length) {
   return bytes.length === length &&
       (range === null || range === `bytes ${offset}-${offset + length - 1}/${file.bytes}`);

@@ -1,6 +1,7 @@
 // Reads tiles and color pages from a package (docs/format.md, "Packages"), which any web server can
-// serve. The counterpart of TileSource, with the same functions. A tile's address is {level,
-// offset}, and `offset` is the tile's number in its level.
+// serve. PackageSource has the same functions as TileSource, which reads them from the voxdag
+// service. The address of a tile is {level, offset}; in a package, `offset` is the number of the
+// tile among the tiles of its level.
 
 import {checkManifest, TileError} from "../tile_source.js";
 import {tileShape} from "../tiles/tile_format.js";
@@ -10,9 +11,9 @@ import {Directory} from "./directory.js";
 
 const kFormat = "voxdag package", kVersion = 1;
 const kBlockTiles = 64;
-const kMaxGap = 16 * 1024;         // bytes between two blocks that are fetched together
-const kMaxRange = 1 << 20;         // bytes that are fetched together
-const kMaxCachedBytes = 32 << 20;  // decompressed blocks
+const kMaxGap = 16 * 1024;         // maximum bytes between two blocks of one request
+const kMaxRange = 1 << 20;         // maximum bytes of one request
+const kMaxCachedBytes = 32 << 20;  // limit for decompressed blocks in memory
 const kLookAgainMs = 5000;
 
 const kReplaced = {
@@ -25,17 +26,17 @@ const kRemoved = {
 };
 
 export class PackageSource {
-  // `files`: PackageFiles, or an object with the same functions.
+  // `files` is a PackageFiles, or an object with the same functions (EmbeddedFiles).
   constructor(files) {
     this.files = files;
     this.info = null;
-    this.ended = null;  // {code, message} after the files were removed or replaced
+    this.ended = null;  // {code, message} once the package was removed or replaced
     this.damage = {
       code: "damaged",
       message:
           "Part of the files is missing or damaged and drawn coarse: run voxdag publish --check."
     };
-    this.blocks = new Map();  // block -> promise of the decoded block, most recently used last
+    this.blocks = new Map();  // block -> promise of the decoded block; last used last
     this.cachedBytes = 0;
     this.lookedMs = -Infinity;
     this.looking = null;
@@ -65,7 +66,8 @@ export class PackageSource {
     return this.info;
   }
 
-  // Requests the directory and the first pack, which every view needs.
+  // Begins to load the first page of the directory and the first pack, because every view needs
+  // them.
   warmUp() {
     if (this.packs.length === 0) return;
     this.directory.page(0).catch(() => {});
@@ -85,8 +87,9 @@ export class PackageSource {
     return index;
   }
 
-  // Resolves to the words of the tiles, in the same order. If a tile's block is missing or damaged,
-  // its place has a TileError. Throws TileError if the server does not answer.
+  // Resolves to a list with the words of each tile of `nodes`, in the same order. If the block of a
+  // tile is missing or damaged, its element is a TileError instead. Throws TileError if the server
+  // does not answer.
   fetchTiles(nodes, options = {}) {
     return this.fetchItems(nodes, options, async ({level, offset}) => {
       const band = this.bandOf(level, "tiles");
@@ -131,7 +134,8 @@ export class PackageSource {
     return answers;
   }
 
-  // Loads blocks that are not loaded. Blocks that are close together are fetched with one request.
+  // Begins to load those `blocks` that are not in this.blocks. One request fetches several blocks
+  // that are close together in a pack.
   async load(blocks, options) {
     const wanted = [];
     for (const block of blocks) {
@@ -148,8 +152,9 @@ export class PackageSource {
     for (const group of merged(places.filter(({error}) => !error))) this.fetchGroup(group, options);
   }
 
-  // Stores a promise of a block immediately, so that concurrent calls do not fetch the block again.
-  // Returns {block, resolve, reject}.
+  // Adds a promise of the block to this.blocks. This is done before the block is requested, so that
+  // concurrent calls do not request it again. Returns {block, resolve, reject}, with the functions
+  // of the promise.
   begin(block) {
     const request = {block};
     const loads = new Promise((resolve, reject) => Object.assign(request, {resolve, reject}));
@@ -169,7 +174,8 @@ export class PackageSource {
       const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
       const decode = (bytes) => this.decode(each.block, part(bytes), bytes.isRange);
       each.resolve(reads.then(decode).catch((error) => {
-        // Without an intact range so far, the server may send wrong ranges.
+        // If no range has been right so far, the server may send wrong ranges. Then fetches the
+        // complete file.
         if (error.status !== 200 || this.files.rangesAreProven || !this.files.hasRanges)
           throw error;
         this.files.hasRanges = false;
@@ -178,7 +184,7 @@ export class PackageSource {
     }
   }
 
-  // `isRange` is true if the bytes are from a range that the server has sent.
+  // Decodes a block. `isRange` is true if `bytes` is from the answer to a range request.
   async decode(block, bytes, isRange) {
     try {
       const plain = await gunzip(bytes), decoded = this.parse(block, plain);
@@ -201,7 +207,8 @@ export class PackageSource {
         plain, level, tileShape(this.info, level), Math.min(kBlockTiles, tiles - first));
   }
 
-  // Forgets the least recently used blocks. Blocks that are being loaded have no size yet.
+  // Removes the least recently used blocks from this.blocks until the others fit in
+  // kMaxCachedBytes. Keeps blocks that are still loading, because their size is unknown.
   evict() {
     for (const [block, loads] of this.blocks) {
       if (this.cachedBytes <= kMaxCachedBytes) return;
@@ -211,8 +218,8 @@ export class PackageSource {
     }
   }
 
-  // Checks, after a file was not found, whether the package still exists. Sets `ended` if it was
-  // removed or replaced.
+  // Called after a file was not found. Checks whether the package still exists, and sets `ended` if
+  // the package was removed or replaced.
   async lookAgain(signal) {
     if (this.ended || performance.now() < this.lookedMs + kLookAgainMs) return;
     this.looking ??= this.look(signal).finally(() => this.looking = null);
@@ -248,7 +255,8 @@ function isOfOneItem(error) {
   return error instanceof TileError && (error.isMissing || error.status === 200);
 }
 
-// Divides places of blocks into groups that are close together in their pack.
+// Sorts the places of blocks and divides them into groups. The blocks of a group are close together
+// in one pack and are fetched with one request.
 function merged(places) {
   places.sort((a, b) => a.pack - b.pack || a.offset - b.offset);
   const groups = [];

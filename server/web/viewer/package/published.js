@@ -1,4 +1,4 @@
-// Makes the page show the package that `voxdag publish` has written together with the page.
+// Makes the page show a package. Only pages that `voxdag publish` has written load this module.
 
 import {setPublished} from "../page_source.js";
 
@@ -6,8 +6,8 @@ import {EmbeddedFiles} from "./embedded_files.js";
 import {PackageFiles} from "./package_files.js";
 import {PackageSource} from "./package_source.js";
 
-// The URL of the package's folder, relative to the page. It may be on another server. "" if the
-// page contains the package.
+// The URL of the folder of the package, relative to the page. The folder may be on another server.
+// If the page itself contains the package, the URL is "".
 const kUrl = document.querySelector("meta[name=voxdag-package]").content;
 
 setPublished(

@@ -33,7 +33,7 @@ export class Light {
       u_floor_center: subtract(center, eye)
     };
   }
-  // Returns the distance from a camera at `eye` to the box of the scene.
+  // Returns the distance between `eye` and the box of the scene; 0 inside the box.
   distanceOfScene(eye) {
     return length(eye.map((x, i) => Math.max(this.low[i] - x, 0, x - this.high[i])));
   }

@@ -30,11 +30,13 @@ export function pauseAfter(failures) {
 
 // Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. Derived classes have
 // these functions:
+//
 //     async fetchAll(batch, options) resolves to the answers, in the order of the requests. An
 //     answer
-//         may be an Error, if only this item is not available
+//                                    may be an Error if only this item is not available
 //     keep(request, answer, nowMs)   false if there is no space; throws if the answer is damaged
 //     nameOf(request)                the item's name for messages
+//
 // and `store.rounds`, the number of readings since the view changed.
 export class Loader {
   // onArrival(failed) is called when an item has arrived, or with `failed` set when a request has
