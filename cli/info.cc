@@ -66,7 +66,8 @@ ordered_json level_json(const FileFacts& facts, uint32_t l) {
   return json;
 }
 
-// Returns the order of the nodes: its name, or its number if this program does not know it.
+// Returns the name of the order of the nodes (docs/format.md, "Node order"), or its number if this
+// program does not know the order.
 std::string order_of(const voxdag_reader::File& file) {
   const std::string name = name_of(NodeOrder{file.node_order()});
   return name.empty() ? std::to_string(file.node_order()) : name;

@@ -46,7 +46,8 @@ void print_chunks(const ExportCommand& command, const query::ChunksReport& repor
               count_text(report.voxels).c_str(), duration_text(wall_s).c_str());
 }
 
-// Returns the facts as members: a number, or a list of numbers. Whole numbers have no fraction.
+// Returns the facts of the report as a JSON object. The value of a fact is a number or a list of
+// numbers. Whole numbers are written as integers.
 nlohmann::ordered_json facts_json(const query::ExportReport& report) {
   const auto number = [](double value) {
     const auto whole = static_cast<int64_t>(value);

@@ -27,7 +27,8 @@ struct PublishCommand {
   unsigned threads = default_threads();
 };
 
-// The default is the name of the file without folder and ending.
+// Returns the title of the page: --title, or the name of the input file without its folder and
+// ending.
 std::string title_of(const PublishCommand& command) {
   if (!command.title.empty()) return command.title;
   const std::string name = command.input.substr(command.input.rfind('/') + 1);
