@@ -1,5 +1,5 @@
-// Tests `voxdag view`, which serves the page of one file on this machine until Ctrl-C, and `voxdag
-// publish`.
+// Tests `voxdag view`, which serves a viewer of one file on this machine until Ctrl-C. Also tests
+// `voxdag publish`.
 #include <signal.h>
 
 #include <chrono>

@@ -1,7 +1,7 @@
-// nanovdb_voxels FILE.nvdb [GRID]: writes, as doubles, the world coordinates of all voxels that are
-// on in the file's first grid, in leaves or in tiles: a mask, or floats, which must be 1. With
-// GRID, writes the voxels of the grid of this name, each followed by its three values. The program
-// reads the file with NanoVDB's own reader.
+// nanovdb_voxels FILE.nvdb [GRID]: writes the world coordinates of voxels as doubles. Without GRID,
+// writes all active voxels of the first grid of the file, in leaves and in tiles. This grid is a
+// mask, or has floats, all of which must be 1. With GRID, writes the voxels of the grid with this
+// name, each followed by its three values. The program reads the file with NanoVDB's own reader.
 #include <nanovdb/util/IO.h>
 
 #include <cstdio>

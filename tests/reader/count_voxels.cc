@@ -1,6 +1,6 @@
-// count_voxels FILE.vdag: reads the file into memory, and prints the number of voxels in its
-// header, the number of voxels found in the DAG, and the number of bricks without a color. Compiled
-// without exceptions, also for Windows, by portable_test.py.
+// count_voxels FILE.vdag: reads the file into memory, and prints three numbers: the voxels
+// according to its header, the voxels found in its DAG, and the bricks without a color.
+// portable_test.py compiles this program without exceptions, also for Windows.
 #define VOXDAG_READER_NO_EXCEPTIONS
 #include <cstdio>
 #include <cstdlib>
@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
   const voxdag_reader::File dag(words.data(), size, "packed.vdag");
   Counter counter{dag};
   if (!dag.empty()) counter.visit(0, 0, 0, 0, 0);
-  // The reader copies bytes that are not aligned.
+  // If the bytes in memory are not aligned, the reader makes an aligned copy.
   std::vector<unsigned char> unaligned(static_cast<size_t>(size) + 1);
   std::memcpy(unaligned.data() + 1, words.data(), static_cast<size_t>(size));
   const voxdag_reader::File copied(unaligned.data() + 1, size);

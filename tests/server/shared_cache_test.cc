@@ -1,4 +1,4 @@
-// Jobs share subvolumes through the cache in the data folder (`jobs.cache`).
+// Jobs share subvolumes through the cache folder in the data folder (setting `jobs.cache`).
 #include <filesystem>
 
 #include "tests/server/running_service.h"
@@ -8,7 +8,7 @@ namespace {
 
 class SharedCache : public RunningService {
  protected:
-  // Runs a job, and returns the member `subvolumes` of its report.
+  // Runs a job to its end. Returns the member `subvolumes` of its report.
   Json subvolumes() {
     const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 64}});
     EXPECT_TRUE(until_state(id, "succeeded"));

@@ -1,4 +1,5 @@
-// Requests of web pages from other origins (CORS, frames), labels and searches, and the machine.
+// Tests requests from web pages of other origins (CORS and frames), labels and the search for jobs,
+// and the facts about the machine.
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {
@@ -12,7 +13,8 @@ client::HeaderMap cross_site(const std::string& origin) {
   return {{"Origin", origin}, {"Sec-Fetch-Site", "cross-site"}};
 }
 
-// A page of a listed origin may read, post and ask before; other pages may not.
+// Pages of a listed origin may send GET and POST requests, and preflight requests for other
+// methods. Pages of other origins may not.
 TEST_F(WebPages, AllowsOnlyListedOriginsToUseTheApi) {
   config_.cors_origins = {kLab};
   start();
@@ -46,7 +48,8 @@ TEST_F(WebPages, AllowsNoOtherOriginsByDefault) {
   EXPECT_EQ(http_->get("/api/v1/jobs", cross_site(kLab)).status, 403);
 }
 
-// Only the viewer, only with ?embed, and only in pages of the setting.
+// Only the viewer may be shown in a frame, only with "embed" in its URL, and only by pages of the
+// origins in the setting.
 TEST_F(WebPages, ShowsOnlyTheEmbeddedViewerInFrames) {
   config_.embed_origins = {kLab, "http://localhost:8888"};
   start();
@@ -68,7 +71,8 @@ TEST_F(WebPages, RefusesOriginsThatAreNone) {
   }
 }
 
-// Labels are part of a job; lists can be searched by words and by label.
+// The labels of a request are returned with the job. Lists of jobs can be searched by words and by
+// label.
 TEST_F(WebPages, FindsJobsByWordsAndLabels) {
   start();
   ASSERT_EQ(put_scene("Menger.glb", scene_bytes()).status, 201);

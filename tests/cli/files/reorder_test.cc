@@ -1,5 +1,5 @@
-// Tests the command reorder, and runs every command that reads a file on a reordered file: it gives
-// the same result as on the original file, or it refuses the file.
+// Tests the command reorder. Also runs every command that reads a file on a reordered file: the
+// command must give the same result as on the original file, or reject the reordered file.
 #include <array>
 
 #include "tests/cli/command_line.h"
@@ -9,8 +9,8 @@ namespace {
 
 class Reorder : public CommandLine {
  protected:
-  // Makes hash.vdag with colors, plain.vdag without, and their reordered copies first.vdag and
-  // plain_first.vdag.
+  // Builds hash.vdag with all attributes and plain.vdag without attributes. Reorders them to
+  // first.vdag and plain_first.vdag.
   void SetUp() override {
     ASSERT_EQ(run({"generate", "city", "c.glb", "--triangles", "1000", "--colors"}).status, 0);
     run_json({"build", "c.glb", "-r", "64", "-o", "hash.vdag", "--attributes",
@@ -19,8 +19,8 @@ class Reorder : public CommandLine {
     run_json({"reorder", "hash.vdag", "-o", "first.vdag"});
     run_json({"reorder", "plain.vdag", "-o", "plain_first.vdag"});
   }
-  // Runs the command with this file in place of "FILE". Returns its standard output without the
-  // members that differ between runs, and the contents of the file "out".
+  // Runs the command with `file` in place of "FILE". Returns its standard output without the
+  // members that differ between runs, followed by the contents of the file "out" if it exists.
   std::string result_of(std::vector<std::string> command, const std::string& file) {
     for (std::string& argument : command)
       if (argument == "FILE") argument = file;
@@ -37,7 +37,7 @@ class Reorder : public CommandLine {
 
 using Commands = std::vector<std::vector<std::string>>;
 
-// These commands do not depend on the order of the nodes.
+// The results of these commands do not depend on the order of the nodes.
 TEST_F(Reorder, CommandsThatReadBothOrders) {
   const Commands commands = {
       {"info", "FILE", "--stats", "--json"},
@@ -65,10 +65,11 @@ TEST_F(Reorder, CommandsThatReadBothOrders) {
   }
 }
 
-// Exports of DAGs contain the same nodes, so they have the same size. Their order may differ.
+// Exported DAGs contain the nodes of the file, so an export of a reordered file has the same size.
+// The order of its nodes may differ.
 TEST_F(Reorder, ExportsOfDags) {
   const std::array<const char*, 3> exports[] = {
-      // format, output, file with the nodes
+      // format, name of the output, name of the file with the nodes
       {"hashdag", "x.basic_dag.dag.bin", "x.basic_dag.dag.bin"},
       {"svdag", "x", "x"},
       {"voxel", "x.voxel.json", "x.voxel.bin"},
@@ -102,7 +103,7 @@ TEST_F(Reorder, CommandsThatNeedTheOrderByHash) {
                  command);
     EXPECT_FALSE(exists("x.vdag"));
   }
-  // Moved files may have either order.
+  // A file to paste may have either order, because its nodes are sorted again.
   const Json pasted =
       run_json({"edit", "plain.vdag", "--paste", "plain_first.vdag@0,0,0", "-o", "x.vdag"});
   EXPECT_EQ(pasted["sha256"], run_json({"info", "plain.vdag", "--digest"})["sha256"]);

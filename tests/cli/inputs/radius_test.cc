@@ -1,4 +1,4 @@
-// Tests build and verify with --solid enclosed --radius on a box whose lid has a gap.
+// Tests build and verify with --solid enclosed --radius on a box with a gap in its lid.
 #include "tests/cli/command_line.h"
 
 namespace command_line {
@@ -6,15 +6,16 @@ namespace {
 
 class RadiusOption : public CommandLine {
  protected:
-  // The box is from 4 to 28 along all axes. The gap has 2 voxels of a grid from 0 to 32.
+  // Writes a box from 4 to 28 along all axes. At the resolution 32, the gap in its lid is 2 voxels
+  // wide.
   void SetUp() override {
     std::string text;
     for (const char* y : {"4", "28"})
       for (const char* x : {"4", "28", "14.5", "17.5"})
         for (const char* z : {"4", "28"}) text += std::string("v ") + x + " " + y + " " + z + "\n";
-    // Vertex 8 * (y is 28) + 2 * (index of x) + (z is 28) + 1.
-    text += "f 1 3 4 2\nf 9 11 12 10\nf 1 9 10 2\nf 3 11 12 4\nf 1 3 11 9\n";  // all but z = 28
-    text += "f 2 6 14 10\nf 8 4 12 16\n";  // the lid, without 14.5 < x < 17.5
+    // The number of a vertex is 8 * (y is 28) + 2 * (index of x in the list) + (z is 28) + 1.
+    text += "f 1 3 4 2\nf 9 11 12 10\nf 1 9 10 2\nf 3 11 12 4\nf 1 3 11 9\n";  // all but the lid
+    text += "f 2 6 14 10\nf 8 4 12 16\n";  // the lid, with a gap at 14.5 < x < 17.5
     put("box.obj", text);
   }
   std::vector<std::string> build(const std::string& radius) const {
@@ -42,7 +43,8 @@ TEST_F(RadiusOption, SealsGaps) {
   EXPECT_EQ(plan["solid"]["interior"]["likely"], sealed["solid"]["interior"]);
 }
 
-// The solid of another radius is recognized, because its voxels in the gap are not in the shell.
+// verify without --radius rejects a solid that was built with a radius: the voxels that fill the
+// gap are set, but no triangle touches them.
 TEST_F(RadiusOption, VerifyFindsAnotherRadius) {
   run_json(build("2"));
   bool is_found = false;

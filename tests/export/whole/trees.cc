@@ -22,7 +22,8 @@ uint32_t set_below(uint32_t mask, uint32_t bit) {
   return static_cast<uint32_t>(std::popcount(mask & ((1u << bit) - 1)));
 }
 
-// OctoMap's origin, key 32768, is the origin of the scene, up to half a voxel.
+// Returns the key (integer coordinates in OctoMap's octree) of the grid's low corner. The key 32768
+// is the origin of the octree, which is at most half a voxel from the origin of the scene.
 Corner low_corner(const Grid& grid) {
   Corner low;
   for (size_t axis = 0; axis < 3; ++axis)
@@ -35,7 +36,7 @@ Corner low_corner(const Grid& grid) {
 struct BtReader {
   const MappedFile& file;
   uint64_t at;
-  Corner zero;  // OctoMap's key (integer coordinates) of the grid's low corner
+  Corner zero;  // low_corner() of the grid
   Digest& digest;
   uint64_t nodes = 1, known = 0;
 

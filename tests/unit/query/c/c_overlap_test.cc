@@ -1,4 +1,5 @@
-// Bricks and collision queries of voxdag.h, compared with a search of all set cells.
+// Tests bricks and collision queries of voxdag.h. The expected results come from a search of all
+// set cells.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +32,8 @@ class COverlapTest : public testing::Test {
   voxdag_file* file_ = nullptr;
 };
 
-// The distance of a point from a cell.
+// Returns the distance of a point from a cell; 0 inside it. `edge` is the edge of a cell, in
+// voxels.
 double distance(const std::array<double, 3>& point, const Position& cell, double edge) {
   double sum = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
@@ -92,7 +94,8 @@ TEST_F(COverlapTest, BoxesOverlapTheCellsInside) {
   EXPECT_LT(hits, 190);
 }
 
-// The reference samples the segment, so capsules with nearly the radius's distance are left out.
+// The expected result comes from sampled points of the segment. It is inexact, so capsules whose
+// distance is nearly their radius are left out.
 TEST_F(COverlapTest, CapsulesOverlapTheCellsWithinTheirRadius) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> at(-3, static_cast<double>(dag_.resolution()) + 3);

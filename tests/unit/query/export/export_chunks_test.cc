@@ -1,5 +1,5 @@
-// Exports in chunks: each set cell of each level is in exactly one chunk, and the manifest
-// describes the files.
+// Tests exports in chunks: each set cell of each level must be in exactly one chunk, and the
+// manifest must describe the files.
 #include "query/export/chunks/export_chunks.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ class ExportChunks : public testing::Test {
   ExportChunks()
       : voxels_(64), scene_(scattered(voxels_)), file_(open_global_file(scene_.path())) {}
 
-  // Sets voxels in three of the eight octants.
+  // Sets voxels in three of the eight octants of the grid.
   static const oracle::Voxels& scattered(oracle::Voxels& voxels) {
     for (int i = 0; i < 20; ++i) voxels.set(i, (7 * i) % 30, (3 * i) % 32);
     for (int i = 32; i < 64; ++i) voxels.set(i, 31, 40);
@@ -39,7 +39,7 @@ class ExportChunks : public testing::Test {
     return nlohmann::json::parse(read_bytes(folder() + "/manifest.json"));
   }
   std::string folder() const { return folder_.file("chunks"); }
-  // Returns the cells in the array `cells`, the first one of the file.
+  // Returns the `count` cells of an exported .npz file. Its first array has them.
   QueryFile::Cells cells_in(const std::string& path, uint64_t count) const {
     const std::string bytes = read_bytes(folder() + "/" + path);
     size_t at = bytes.find('\n') + 1;  // after the header of the array
@@ -110,7 +110,7 @@ TEST_F(ExportChunks, AFolderWithFilesIsRefused) {
     EXPECT_THROW(exported(static_cast<uint64_t>(edge), static_cast<uint64_t>(levels)), Error);
 }
 
-// A region without voxels has no chunks, which is no error.
+// An export of a region without voxels succeeds, and writes no chunks.
 TEST_F(ExportChunks, AnEmptyRegionHasAnEmptyManifest) {
   EXPECT_EQ(exported(16, 1, {{32, 0, 0}, {48, 16, 16}}).chunks, 0u);
   EXPECT_EQ(manifest()["levels"][0]["chunks"].size(), 0u);

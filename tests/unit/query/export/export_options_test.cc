@@ -1,5 +1,5 @@
-// Options of exports: the axis that points up, options that only some formats have, and the numbers
-// in the report.
+// Tests the options of exports: the axis that points up, options that only some formats have, and
+// the numbers in the report.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -47,7 +47,8 @@ std::set<Position> cells_of(const DagView& dag, uint32_t levels) {
   return cells;
 }
 
-// Both turns move each cell of each level to the same place as AxisTurn.
+// A turned DAG has the cells that AxisTurn computes for each cell of the original, on several
+// levels.
 TEST_F(ExportOptionsTest, ADagIsTurnedCellByCell) {
   const DagView dag(*file_);
   for (const AxisTurn& turn : {kTurnYToZ, kTurnZToY}) {
@@ -74,7 +75,7 @@ TEST_F(ExportOptionsTest, ATurnMapsYToZ) {
   EXPECT_EQ(kTurnYToZ.original(kTurnYToZ.turned(region, 8), 8), region);
 }
 
-// A voxel has the same attributes before and after a turn. Its normal turns with it.
+// A turn does not change the attributes of a voxel, except that it turns its normal.
 TEST_F(ExportOptionsTest, AttributesTurnWithTheirVoxels) {
   const auto rows = [&](UpAxis up) {
     ExportOptions options;

@@ -1,4 +1,4 @@
-// The faces of a brick's cells and their order equal those of simple loops.
+// Tests faces_of_brick() and BrickMap against simple loops, and PlaneSort against a plain sort.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ TEST(Faces, OfRandomBricks) {
   }
 }
 
-// Planes with few faces, with many faces, and without faces.
+// The planes have many faces, few faces, or none.
 TEST(Faces, AreSortedByPlane) {
   MemoryBudget budget(uint64_t{1} << 26);
   std::mt19937_64 random(2);
@@ -62,7 +62,8 @@ TEST(Faces, AreSortedByPlane) {
   }
 }
 
-// All bricks of a 8x8x8 grid whose number is no multiple of 3, as single bricks, and one full cube.
+// The map has one full cube, and as single bricks those of 8x8x8 bricks whose Morton code is not a
+// multiple of 3. The code of a brick is also its mask.
 TEST(Faces, NeighborsInBrickMap) {
   BrickMap map;
   constexpr uint64_t kCube = 64 * 3;  // Morton code of a cube of 4x4x4 bricks

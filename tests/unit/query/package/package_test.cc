@@ -1,4 +1,5 @@
-// Tests packages: their tiles and color pages must be those of the file, and damage must be found.
+// Tests packages: their tiles and color pages must be the same as in the file, and damage must be
+// found.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -76,12 +77,11 @@ class Package : public testing::Test {
   std::vector<ViewerFile> viewer_;
 };
 
-// Compares all tiles of a package with the tiles that the service makes, and returns the number of
-// tiles.
+// Compares all tiles of a package with the results of encode_tile(). Returns the number of tiles.
 uint64_t compare_tiles(const voxdag_reader::File& file, const PackageReader& package) {
   const DagView dag(file);
   const uint32_t bricks = file.brick_level();
-  std::vector<uint64_t> offsets = {0};  // of the band, by number
+  std::vector<uint64_t> offsets = {0};  // roots of the current band, by tile number
   uint64_t count = 0;
   for (uint32_t level = 0; level < bricks;) {
     std::map<uint64_t, uint64_t> below;  // number -> word offset
@@ -166,7 +166,8 @@ TEST_F(Package, HasTheColorsOfTheFile) {
   }
 }
 
-// The bytes do not depend on threads, on the memory, or on the layout of the file.
+// The bytes of a package do not depend on the number of threads, on the memory, or on the pointer
+// sizes in the file.
 TEST_F(Package, IsTheSameForAnyRun) {
   const oracle::Voxels voxels = random_voxels(3, 128);
   const QueryFile scene(voxels), wide(voxels, 64);
@@ -181,7 +182,7 @@ TEST_F(Package, IsTheSameForAnyRun) {
   EXPECT_EQ(contents("a"), contents("w"));
 }
 
-// A package without its last packs still has all tiles of the coarser bands.
+// If only the first pack exists, the reader still returns the tiles in it, such as the root tile.
 TEST_F(Package, IsCoarserWithoutItsLastPacks) {
   const ColoredScene scene{12, 3, random_codes(8, 12, 20000), smooth_colors(3, 3)};
   write_colored(path("c.vdag"), scene, false);
@@ -224,8 +225,8 @@ TEST_F(Package, NamesDamage) {
   check("p");
 }
 
-// No change of one byte of the index crashes the reader or passes unnoticed as another number of
-// tiles.
+// After a change of any one byte of the index, the reader does not crash. If it reports an error,
+// the message names the package.
 TEST_F(Package, RefusesChangedIndexes) {
   write_random("p", 64);
   const std::string file = path("p/package.json"), intact = read_bytes(file);
@@ -243,7 +244,7 @@ TEST_F(Package, RefusesChangedIndexes) {
   EXPECT_THAT(check_error("p"), testing::HasSubstr("'format': expected 'voxdag package'"));
 }
 
-// Damaged blocks give an error, or tiles that fit their block.
+// Decoding a damaged block throws Error{kCorrupt} or returns the right number of tiles.
 TEST_F(Package, SurvivesDamagedBlocks) {
   const QueryFile scene(random_voxels(7, 64));
   const auto file = open_global_file(scene.path());
@@ -295,7 +296,8 @@ TEST_F(Package, ReplacesOnlyPackages) {
     EXPECT_EQ(entry.path().string().find(".work-"), std::string::npos);
 }
 
-// Whenever the disk fails, the folder has the old package or the new one.
+// If the disk fails during the replacement of a package, the folder still has a complete package,
+// the old one or the new one.
 TEST_F(Package, IsCompleteAfterFaults) {
   const QueryFile scene(random_voxels(5, 8)), second(random_voxels(6, 8));
   const auto file = open_global_file(scene.path()), file2 = open_global_file(second.path());

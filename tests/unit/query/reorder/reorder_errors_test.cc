@@ -1,5 +1,5 @@
-// Damaged files, full disks and interruptions give an error. No output and no temporary files
-// remain.
+// Tests reorder() with damaged files, full disks and interruptions: it must report an error, and
+// leave neither an output nor temporary files.
 #include <optional>
 
 #include "query/combine/combine.h"
@@ -11,7 +11,7 @@
 namespace voxdag::query {
 namespace {
 
-// The parameter is the order of the output.
+// The test parameter is the order of the output. The input "a" has the other order.
 class ReorderErrors : public Reorder, public testing::WithParamInterface<NodeOrder> {
  protected:
   ReorderErrors() {
@@ -20,8 +20,8 @@ class ReorderErrors : public Reorder, public testing::WithParamInterface<NodeOrd
     reorder_file("a", spec(NodeOrder::kByFirstParent, "b"));
     std::filesystem::rename(path("b"), path("a"));
   }
-  // Reorders a, with so little memory that most data is in scratch files. Returns the code of the
-  // error; nullopt without an error.
+  // Reorders "a" to "out", with so little memory that most data is in scratch files. Returns the
+  // code of the error, or nullopt after success.
   std::optional<ErrorCode> reorder_error(FileSystem& files, const CancelToken& cancel) {
     try {
       const auto a = open_global_file(path("a"));
@@ -50,7 +50,7 @@ TEST_P(ReorderErrors, DamagedInput) {
   }
 }
 
-// If the disk is full from the n-th write on, reorder() fails with kNoSpace.
+// The disk is full from the write number `at` on.
 TEST_P(ReorderErrors, FullDisk) {
   uint64_t failed = 0;
   for (uint64_t at = 1;; at += 1 + at / 4) {
@@ -65,8 +65,8 @@ TEST_P(ReorderErrors, FullDisk) {
   EXPECT_GT(failed, 5u);
 }
 
-// The process is killed after each of many operations. The same command then gives the same bytes,
-// and removes the temporary files of the killed process.
+// The process is killed after `kill_after` operations. The next reorder() must then give the same
+// bytes, and remove the temporary files of the killed process.
 TEST_P(ReorderErrors, Killed) {
   reorder_error(system_files(), never_);
   const std::string clean = bytes("out");
@@ -100,8 +100,8 @@ TEST_P(ReorderErrors, Canceled) {
 INSTANTIATE_TEST_SUITE_P(Orders, ReorderErrors,
                          testing::Values(NodeOrder::kByFirstParent, NodeOrder::kByHash));
 
-// combine() refuses files in the order by first parent, unless the file is moved: a moved file is
-// sorted.
+// combine() rejects files in the order by first parent. A file that is moved may have this order,
+// because its nodes are sorted again.
 TEST_F(Reorder, CombineNeedsTheOrderByHash) {
   write_global(path("a"), random_voxels(7, 64));
   write_global(path("b"), random_voxels(8, 64));

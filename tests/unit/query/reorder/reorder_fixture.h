@@ -1,4 +1,4 @@
-// Reorders small files, and makes the expected levels by a depth-first walk.
+// A fixture that reorders small files, and a simple implementation of the order by first parent.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -19,18 +19,18 @@
 
 namespace voxdag::query {
 
-// The words of each level, the root's level first.
+// The words of each level. Index 0 is the level of the root.
 using LevelWords = std::vector<std::vector<uint32_t>>;
 
-// Walks the octree of a file depth first, and numbers the nodes of each level as they are met. This
-// is the order by first parent.
+// Computes the order by first parent with a depth-first walk of the octree: the nodes of each level
+// are in the order in which the walk first reaches them.
 class DepthFirstOrder {
  public:
   explicit DepthFirstOrder(const voxdag_reader::File& file)
       : file_(file), levels_(file.brick_level() + 1), places_(levels_.size()) {
     if (!file.empty()) visit(0, 0);
   }
-  // Returns the levels, with pointers in the new order.
+  // Returns the words of all levels in the new order, with new pointers.
   LevelWords levels() const { return levels_; }
 
  private:
@@ -59,7 +59,7 @@ class DepthFirstOrder {
 
   const voxdag_reader::File& file_;
   LevelWords levels_;
-  std::vector<std::map<uint64_t, uint64_t>> places_;  // new offsets by old offsets
+  std::vector<std::map<uint64_t, uint64_t>> places_;  // by level: old offset -> new offset
 };
 
 inline LevelWords words_of(const voxdag_reader::File& file) {
@@ -93,7 +93,7 @@ class Reorder : public testing::Test {
     with_reader_errors(
         [&] { verify_global_file(*file, 2, budget, progress_, never_, narrow_words, is_quick); });
   }
-  // Checks that the folder contains exactly these files.
+  // Expects that the folder contains exactly the files with these names.
   void expect_files(std::vector<std::string> names) const {
     std::vector<std::string> found;
     for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))

@@ -1,4 +1,5 @@
-// The order by first parent equals a depth-first walk, and reordering back gives the same bytes.
+// Tests reorder(): the order by first parent must equal the order of a depth-first walk, and
+// reordering back must give the original bytes.
 #include "query/tiles/tile.h"
 #include "tests/unit/core/format/color/valued_files.h"
 #include "tests/unit/query/reorder/reorder_fixture.h"
@@ -8,8 +9,9 @@ namespace {
 
 constexpr uint64_t kNarrow = global_layout::kNarrowLevelWords;
 
-// Limits for lists and levels in memory: none; one that sorts the pointers of large levels on the
-// disk; one that sorts almost everything on the disk.
+// Limits for the memory of a list or level. With the first, everything is in memory; with the
+// second, the pointers of large levels are sorted on the disk; with the third, nearly everything is
+// on the disk.
 constexpr uint64_t kListLimits[] = {~uint64_t{0}, 2048, 256};
 
 struct SmallFile {
@@ -41,7 +43,7 @@ TEST_P(ReorderSmall, EqualsDepthFirstWalk) {
     EXPECT_TRUE(bytes("c") == bytes("a"));
     const std::string once = bytes("b");
     std::filesystem::copy(path("b"), path("d"), std::filesystem::copy_options::overwrite_existing);
-    reorder_file("d", first);  // a file that already has the order
+    reorder_file("d", first);  // "d" already has the new order
     EXPECT_TRUE(bytes("b") == once);
     expect_files(list_bytes == kListLimits[0] ? std::vector<std::string>{"a", "b", "c", "d"}
                                               : std::vector<std::string>{"a", "b", "c", "d"});
@@ -63,7 +65,7 @@ TEST_F(Reorder, EmptyFile) {
   EXPECT_TRUE(bytes("c") == bytes("a"));
 }
 
-// Sections with colors and other attributes are copied byte for byte.
+// The sections of all attributes are copied byte for byte.
 TEST_F(Reorder, KeepsAttributes) {
   const ColoredScene scene{6, 5, random_codes(21, 6, 3000), smooth_colors(5, 4)};
   write_valued(path("a"), scene, AttributeSet::all());
@@ -81,8 +83,8 @@ TEST_F(Reorder, KeepsAttributes) {
   EXPECT_TRUE(bytes("c") == bytes("a"));
 }
 
-// A tile refers to its nodes in its own order, so a tile that has the complete DAG does not depend
-// on the order of the file.
+// A tile numbers its nodes in its own order. So a tile that contains the complete DAG does not
+// depend on the order of the nodes in the file.
 TEST_F(Reorder, TilesAreEqual) {
   write_global(path("a"), random_voxels(7, 64));
   reorder_file("a", spec(NodeOrder::kByFirstParent, "b"));
@@ -90,7 +92,8 @@ TEST_F(Reorder, TilesAreEqual) {
   EXPECT_EQ(encode_tile(DagView(*a), 4, {}), encode_tile(DagView(*b), 4, {}));
 }
 
-// A file in the order by first parent, which is changed before it is written.
+// The levels of a file in the order by first parent. Tests change them and write them as the file
+// "c".
 class OrderDefects : public Reorder {
  protected:
   OrderDefects() {
@@ -103,7 +106,8 @@ class OrderDefects : public Reorder {
   }
   std::vector<uint32_t>& bricks() { return levels_.back(); }
   std::vector<uint32_t>& parents() { return levels_[levels_.size() - 2]; }
-  // Writes the file and returns the message of verify; "" if the file is valid.
+  // Writes the levels as "c", and verifies this file. Returns the message of the error; "" if the
+  // file is valid.
   std::string verified(bool is_quick = false) {
     GlobalFileWriter writer(system_files(), path("c"), grid_of(64), 64);
     writer.set_node_order(NodeOrder::kByFirstParent);
@@ -159,7 +163,8 @@ TEST_F(OrderDefects, UnreachableBrickIsNamed) {
       << verified();
 }
 
-// Gives the last pointer to an earlier brick its own copy of the brick.
+// Makes a second copy of a brick, and changes the last pointer so that it refers to the copy. So
+// the level has two equal bricks.
 TEST_F(OrderDefects, DuplicateIsNamedUnlessQuick) {
   uint32_t* last = nullptr;
   uint32_t highest = 0;
@@ -178,7 +183,8 @@ TEST_F(OrderDefects, DuplicateIsNamedUnlessQuick) {
       << verified();
 }
 
-// Wrong levels with right checksums never crash reorder(), in any way of ordering them.
+// A wrong word in a level, with right checksums, never crashes reorder(), whatever the order of the
+// output and the memory.
 TEST_F(OrderDefects, HostileLevels) {
   const LevelWords intact = levels_;
   for (size_t l = 0; l < intact.size(); ++l)

@@ -196,7 +196,7 @@ TEST_F(Queue, ListsPageByPage) {
   EXPECT_EQ(queue_->counts().at(JobState::kQueued), 4u);
 }
 
-// A damaged request neither matches nor makes a search fail.
+// A job with a damaged request matches no words and no label, and the search does not fail.
 TEST_F(Queue, SearchesWordsAndLabels) {
   const std::string id = post().id, damaged = post().id;
   queue_->change(id, [](Job& j) {
