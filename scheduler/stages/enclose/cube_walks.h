@@ -26,7 +26,7 @@ DagShape position_shape(const DagShape& shape);
 void find_blocked(BuildJob& job, const std::vector<FilledPart>& shell, FilledParts& blocked);
 
 // Computes the enclosed voxels, which include the shell, from the closed positions in `closed`, and
-// completes `solid` with them. Warns if the solid has no voxels besides the shell. Throws like
+// completes `solid` with them. Warns if the shell has all voxels of the solid. Throws like
 // find_blocked().
 void find_enclosed(BuildJob& job, const std::vector<FilledPart>& closed, FilledParts& solid);
 
