@@ -48,7 +48,7 @@ Position place_of(const ExportJob& job) {
   return place;
 }
 
-// What a cube of the octree contains.
+// The content of an octree cube: no set cells, some, or only set cells.
 enum class Content : uint8_t { kNothing, kSomething, kFull };
 
 // The cells of one block of the octree, as bits in Morton order. The lowest bit of an index is the
@@ -111,7 +111,7 @@ class BlockCells {
 // buffer. For these, a search for a voxel decides whether they are inner nodes.
 class BtTree {
  public:
-  // Receives the bytes of the next nodes of the file.
+  // A function that receives the bytes of the next nodes of the file.
   using Write = std::function<void(std::span<const uint8_t> bytes)>;
 
   BtTree(const ExportJob& job, Write write)

@@ -62,8 +62,8 @@ TEST(Faces, AreSortedByPlane) {
   }
 }
 
-// The map has one full cube, and as single bricks those of 8x8x8 bricks whose Morton code is not a
-// multiple of 3. The code of a brick is also its mask.
+// The map has one full cube. Outside the cube, it has single bricks in a grid of 8x8x8 bricks: each
+// brick whose Morton code is not a multiple of 3. The mask of such a brick is its Morton code.
 TEST(Faces, NeighborsInBrickMap) {
   BrickMap map;
   constexpr uint64_t kCube = 64 * 3;  // Morton code of a cube of 4x4x4 bricks
