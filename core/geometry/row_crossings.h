@@ -10,8 +10,9 @@
 
 namespace voxdag {
 
-// Finds the first point of a row that is beyond a triangle, from an estimate in floating point. The
-// exact test, in integers, is necessary only if a point is within the estimate's error.
+// Finds the first sample point of a row behind the place where the row crosses a triangle.
+// Estimates this place in floating point, and uses the exact integer test only if a sample point is
+// within the estimate's error.
 class FirstBeyond {
  public:
   template <class Test>

@@ -23,12 +23,12 @@
 
 namespace voxdag::query {
 
-// The folder for scratch files, and the memory for lists.
+// The folder to which the lists below write scratch files, and the memory that a list may use.
 struct SpillSpace {
   ScratchFolder& folder;
   MemoryBudget& budget;
-  uint64_t list_bytes = 0;    // maximum memory of a finished list
-  uint64_t sorter_bytes = 0;  // maximum memory of a list while it is sorted
+  uint64_t list_bytes = 0;    // maximum memory of a list without its scratch file
+  uint64_t sorter_bytes = 0;  // maximum memory of a SpillSorter before finish()
   uint64_t buffer_bytes = 0;  // size of the buffers with which scratch files are read
 };
 

@@ -59,9 +59,9 @@ Region world_to_region(const voxdag_reader::File& file, uint32_t grid_levels,
 void check_grid(const Selection& selection, uint32_t file_levels) {
   if (selection.grid_levels < kBrickLevels || selection.grid_levels > file_levels)
     throw Error(ErrorCode::kInvalidInput,
-                "a grid of 2^" + std::to_string(selection.grid_levels) +
+                "the selected resolution is 2^" + std::to_string(selection.grid_levels) +
                     " voxels per edge: expected 2^" + std::to_string(kBrickLevels) + " to 2^" +
-                    std::to_string(file_levels) + ", the grid of the file");
+                    std::to_string(file_levels) + ", the resolution of the file");
 }
 
 }  // namespace voxdag::query

@@ -56,7 +56,7 @@ void refuse_other_folder(FileSystem& files, const std::string& path) {
     index_of_folder(files, path);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kNotFound && !error.is_corruption()) throw;
-    throw Error(ErrorCode::kInvalidInput, path + " has other files" + advice);
+    throw Error(ErrorCode::kInvalidInput, path + " has files that are not of a package" + advice);
   }
 }
 

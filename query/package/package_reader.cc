@@ -45,13 +45,17 @@ PackageReader::PackageReader(FileSystem& files, const std::string& folder)
   const auto levels = manifest.value("levels", nlohmann::json());
   if (!levels.is_number_unsigned() || levels.get<uint64_t>() < kBrickLevels ||
       levels.get<uint64_t>() > uint64_t{kMaxGridLevels})
-    corrupt(path, "'levels' of the manifest: expected the levels of a grid");
+    corrupt(path, "'levels' of the manifest is " + levels.dump() +
+                      ": expected a whole number from " + std::to_string(kBrickLevels) + " to " +
+                      std::to_string(kMaxGridLevels));
   if (manifest.value("tile_levels", 0) != static_cast<int>(kPackageTileLevels))
     corrupt(path, "'tile_levels' of the manifest: expected " + std::to_string(kPackageTileLevels));
   grid_levels_ = levels.get<uint32_t>();
   for (const PackageBand& band : index_.bands)
     if (band.is_color ? band.level > grid_levels_ : band.level + kBrickLevels >= grid_levels_)
-      corrupt(path, "'bands': expected levels of the grid");
+      corrupt(path, "'bands' has the level " + std::to_string(band.level) +
+                        ": expected a level of the grid of " + std::to_string(grid_levels_) +
+                        " levels");
   read_directory();
 }
 

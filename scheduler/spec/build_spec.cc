@@ -51,13 +51,13 @@ class LimitChecker {
 void check_radius(const GeometryOptions& g) {
   if (g.radius == 0) return;
   if (g.solid != SolidName::kEnclosed)
-    json_fields::refuse("radius", "the solid rule enclosed as well");
+    json_fields::refuse("radius", "'solid' to be enclosed, because other rules have no radius");
   if (g.radius >= g.resolution)
     json_fields::refuse("radius", "less than the resolution, " + std::to_string(g.resolution) +
                                       ", not " + std::to_string(g.radius));
   if (g.resolution > kMaxRadiusResolution)
-    json_fields::refuse("radius",
-                        "a resolution of at most " + std::to_string(kMaxRadiusResolution));
+    json_fields::refuse("radius", "a resolution of at most " +
+                                      std::to_string(kMaxRadiusResolution) + " with a radius");
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ void check_options(const BuildSpec& spec) {
     json_fields::refuse(
         "solid", "cutouts other than skip, because skipped cutouts are holes in the surface");
   if (g.seed && g.solid != SolidName::kEnclosed)
-    json_fields::refuse("seed", "the solid rule enclosed as well");
+    json_fields::refuse("seed", "'solid' to be enclosed, because other rules have no seed");
   check_radius(g);
   if (g.solid != SolidName::kNone && g.thin)
     json_fields::refuse("thin", "no solid at the same time");

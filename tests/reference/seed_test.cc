@@ -115,7 +115,7 @@ TEST_F(Seeds, PointsOutsideTheGridAreRefused) {
     EXPECT_NE(refusal(seeded(scene, 32, seed)).find("outside the grid"), std::string::npos);
   BuildSpec winding = seeded(scene, 32, {3, 3, 3});
   winding.geometry.solid = SolidName::kWinding;
-  EXPECT_NE(refusal(winding).find("'seed': expected the solid rule enclosed"), std::string::npos);
+  EXPECT_NE(refusal(winding).find("'seed': expected 'solid' to be enclosed"), std::string::npos);
 }
 
 }  // namespace

@@ -44,8 +44,8 @@ class SegmentWriter {
   void sync_written();
   // Returns the number of bytes flushed to the file so far.
   uint64_t written() const { return written_; }
-  // Call it after a flush that failed because the disk was full. Frees the disk space of the
-  // buffered bytes that the flush has written.
+  // Frees the disk space of a partial write. Call it after flush() failed because the disk was
+  // full. The bytes remain in the buffer, so a later flush() can write them again.
   void release_unwritten();
 
  private:

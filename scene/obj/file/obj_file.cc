@@ -193,7 +193,8 @@ void ObjFile::add_warnings(const Scan& scan) {
   add("unknown-statements", scan.unknown, unknown.c_str());
 }
 
-// Sets has_splits of the blocks with faces that are not fans. Warns about faces whose edges cross.
+// Sets has_splits for each block with a face that cannot be triangulated as a fan around its first
+// corner. Warns about faces whose edges cross.
 void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   PolygonReader polygons(*this, budget);
   Positions vertices(*this, budget);

@@ -189,7 +189,7 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
   if (tested.exit_status != 0 && !is_unreachable(tested))
     throw Error(ErrorCode::kInvalidInput,
                 "sbatch would refuse the tasks: " + trimmed(tested.error + tested.output) +
-                    ": expected other --cluster-options");
+                    ": expected --cluster-options that sbatch accepts");
 }
 
 std::string Slurm::setting(const std::string& name) {

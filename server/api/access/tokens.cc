@@ -49,7 +49,8 @@ Tokens Tokens::read(FileSystem& files, const std::string& path) {
         hash.find_first_not_of("0123456789abcdef") != std::string::npos)
       throw Error(ErrorCode::kInvalidInput,
                   path + ":" + std::to_string(number) +
-                      ": expected ROLE NAME SHA256, the role read, submit or admin");
+                      ": invalid token: expected ROLE NAME SHA256. ROLE is one of read, submit and "
+                      "admin; SHA256 has 64 lowercase hexadecimal digits");
     tokens.entries_.push_back({{*parsed, name, ""}, hash});
   }
   if (tokens.entries_.empty())

@@ -42,9 +42,9 @@ struct Plane {
   int64_t rising() const;
   int64_t falling() const;
 
-  // In these functions, the cube has an edge of 2^size_log2 voxels.
+  // In these functions, the cube has an edge of 2^size_log2 voxels; n, k and f are as above.
   //
-  // True if all values n.k + f within a cube that the plane crosses fit in 62 bits.
+  // True if, for every cube that the plane crosses, n.k + f fits in 62 bits at all corners k.
   bool fits(int size_log2) const;
   // True if a plane with this normal and with the offset f from a cube sets voxels of the cube.
   // Requires fits().

@@ -276,7 +276,7 @@ TEST_F(Package, ReplacesOnlyPackages) {
   const QueryFile scene(random_voxels(5, 32)), second(random_voxels(6, 64));
   const auto file = open_global_file(scene.path()), file2 = open_global_file(second.path());
   EXPECT_THAT(error_of([&] { write(*file, spec(*file, "other")); }).message(),
-              testing::HasSubstr("has other files: expected a new folder"));
+              testing::HasSubstr("has files that are not of a package: expected a new folder"));
   EXPECT_EQ(names(path("other")), std::vector<std::string>{"mine.txt"});
   write_bytes(path("file"), "mine");
   EXPECT_THAT(error_of([&] { write(*file, spec(*file, "file")); }).message(),

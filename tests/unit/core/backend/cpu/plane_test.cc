@@ -96,9 +96,9 @@ int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, con
   return compared;
 }
 
-// The memo's nodes equal drawn nodes: they exist for the same cubes, and have the same hashes and
-// counts. A third of the normals have components of at most 1 (walls and diagonals), a third of at
-// most 12, and a third of at most 300.
+// Compares the nodes that PlaneMemo returns with nodes built by drawing the triangle. Both must
+// exist for the same cubes, and have the same hashes and counts. The components of the normals are
+// at most 1 (walls and diagonals), 12 or 300, each in a third of the rounds.
 void expect_memo_equals_drawing(VoxelRule rule) {
   oracle::Random random(6);
   const auto tile = std::make_unique<TileBricks>();

@@ -90,8 +90,9 @@ TEST_F(CutoutCheckpointTest, NoticesAChangeOfAnImage) {
   }
 }
 
-// A build begins without the image, so it cuts nothing out. If the image appears before the build
-// resumes, the result is the same as if the image had existed from the beginning.
+// A build begins while the leaf's texture is missing, so it keeps the complete surfaces of the
+// leaf. If the texture appears before the build resumes, the result equals that of a build that had
+// the texture from the beginning.
 TEST_F(CutoutCheckpointTest, NoticesANewImage) {
   const std::string image = folder_.file("leaf.png"), other = folder_.file("other.png");
   std::filesystem::rename(image, other);
