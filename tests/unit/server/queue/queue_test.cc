@@ -191,7 +191,8 @@ TEST_F(Queue, ListsPageByPage) {
   page = queue_->list(filter);
   ASSERT_EQ(page.size(), 2u);
   EXPECT_EQ(page[1].id, ids[4]);
-  filter = {{JobState::kSucceeded, JobState::kFailed}, INT64_MAX, 50};
+  filter = {};
+  filter.states = {JobState::kSucceeded, JobState::kFailed};
   EXPECT_EQ(queue_->list(filter).size(), 1u);
   EXPECT_EQ(queue_->counts().at(JobState::kQueued), 4u);
 }
