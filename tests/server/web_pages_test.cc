@@ -85,8 +85,8 @@ TEST_F(WebPages, FindsJobsByWordsAndLabels) {
   EXPECT_EQ(job(second)["labels"], Json::array());
   const auto found = [&](const std::string& query) {
     std::string ids;
-    for (const Json& each : Json::parse(http_->get("/api/v1/jobs?" + query).body)["jobs"])
-      ids += each["id"] == first ? "1" : "2";
+    const Json list = Json::parse(http_->get("/api/v1/jobs?" + query).body);
+    for (const Json& each : list["jobs"]) ids += each["id"] == first ? "1" : "2";
     return ids;
   };
   EXPECT_EQ(found("q=menger"), "12");
