@@ -107,7 +107,8 @@ query::PackageReport write(const PublishCommand& command, const voxdag_reader::F
 void run(const PublishCommand& command, CommandContext& context) {
   if (!command.check.empty()) return check(command, context);
   if (command.input.empty() || command.output.empty())
-    throw Error(ErrorCode::kInvalidInput, "expected a .vdag file and --output DIR, or --check DIR");
+    throw Error(ErrorCode::kInvalidInput,
+                "a .vdag file and --output DIR are required, or --check DIR");
   query::PackageSpec spec;
   spec.output = command.output;
   spec.colors = !command.gray;
