@@ -20,12 +20,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // Runs `command` in a child process that has just received SIGTERM, whose handler cancels the
-// command's token. Returns the exit status of the process.
-int interrupted(const std::function<void(CancelToken& cancel)>& command) {
+// command's token. The process calls `prepare` before the signal. Returns its exit status.
+int interrupted(
+    const std::function<void(CancelToken& cancel)>& command,
+    const std::function<void()>& prepare = [] {}) {
   const pid_t child = fork();
   if (child == 0) {
     static CancelToken cancel;
     catch_signals(cancel);
+    prepare();
     raise(SIGTERM);
     command(cancel);
     _exit(0);
@@ -61,12 +64,11 @@ TEST(Signals, LetACommandStopByItself) {
 }
 
 TEST(Signals, LetAServerCompleteItsAnswers) {
-  EXPECT_EQ(interrupted([](CancelToken&) {
-              allow_slow_stop();
-              sleep_for_seconds(3 * kMaxStopS);
-              _exit(7);
-            }),
-            7);
+  const auto answer = [](CancelToken&) {
+    sleep_for_seconds(3 * kMaxStopS);
+    _exit(7);
+  };
+  EXPECT_EQ(interrupted(answer, allow_slow_stop), 7);
 }
 
 TEST(Signals, TheSecondOneEndsTheProcess) {
