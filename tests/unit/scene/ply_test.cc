@@ -313,7 +313,7 @@ TEST(Ply, HostileHeadersAreRefused) {
       {begin + "element vertex -1\n" + xyz + "end_header\n", "below 2^64"},
       {begin + "element vertex 0\n" + xyz + "element face 18446744073709551615\n" + list +
            "end_header\n",
-       "face 0 ends past"},
+       "face 0 is cut off"},
       {begin + "element a 18446744073709551615\nelement b 3\nproperty int c\nelement vertex 0\n" +
            xyz + "end_header\n",
        "element b"},
@@ -327,11 +327,11 @@ TEST(Ply, HostileHeadersAreRefused) {
        "float type for the count of a list"},
       {begin + "element vertex 0\nproperty list uchar int x\nend_header\n", "without a property x"},
       {begin + "element vertex 0\n" + xyz + "element tristrips 1\n" + list + "end_header\n",
-       "tristrips 0 ends past"},
+       "tristrips 0 is cut off"},
       {begin + "element vertex 0\n" + xyz + "element tristrips 1\nproperty int a\nend_header\n",
        "tristrips without vertices, expected a list vertex_indices"},
       {begin + "element vertex 0\n" + xyz + "element tristrips 1\n" + list + "end_header\n\3\1",
-       "tristrips 0 ends past"},
+       "tristrips 0 is cut off"},
       {begin + "element vertex 0\n" + xyz +
            "element tristrips 1\nproperty list int int vertex_indices\nend_header\n" +
            std::string("\xff\xff\xff\x7f", 4),
@@ -372,7 +372,7 @@ TEST(Ply, HostileTextIsRefused) {
       {"0 0 0\n1 0 zero\n0 1 0\n3 0 1 2\n", "vertex 1 has zero, expected a number"},
       {"0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "vertex 1 has too few values on its line"},
       {"0 0 0\n1 0 0 0\n0 1 0\n3 0 1 2\n", "vertex 1 has more on its line"},
-      {"0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "face 0 ends before"},
+      {"0 0 0\n1 0 0\n0 1 0\n3 0 1\n", "face 0 has too few values"},
       {"0 0 0\n1 0 0\n0 1 0\n3 0 1 2.5\n", "face 0 has 2.5, expected an integer"},
       {"0 0 0\n1 0 0\n0 1 0\n-3 0 1 2\n", "a list of -3 entries"},
       {"0 0 0\n1 0 0\n0 1 0\n99999999999999999999 0 1 2\n", "expected an integer"},

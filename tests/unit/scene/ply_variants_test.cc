@@ -227,7 +227,7 @@ TEST(PlyVariants, RowsOfSeveralLines) {
   EXPECT_EQ(triangles_of_file(header + replaced(kRows, "\n", " ")), kOnlyLower);
   EXPECT_EQ(triangles_of_file(header + replaced(kRows, " ", " \r\n\t")), kOnlyLower);
   for (const auto& [rows, message] :
-       {std::pair{"0 0 0 1 0 0 0 1 0 3 0 1", "face 0 ends before"},
+       {std::pair{"0 0 0 1 0 0 0 1 0 3 0 1", "face 0 has too few values"},
         std::pair{"0 0 0 1 0 0 0 1 0 3 0 1 2 4", "has 4 after its last row"}})
     EXPECT_NE(error_of_file(header + rows).message().find(message), std::string::npos) << rows;
 }

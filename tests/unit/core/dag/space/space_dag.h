@@ -131,6 +131,7 @@ class SpaceDag {
     const auto grid_levels = static_cast<uint32_t>(size_log2);
     summary = emit_levels(tables, {0, grid_levels, 64}, dag);
     SpaceGrid out(edge_);
+    if (summary.empty()) return out;
     expand(dag, static_cast<int>(dag.levels.size()), 0, {0, 0, 0}, edge_, out);
     return out;
   }
