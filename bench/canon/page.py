@@ -11,12 +11,14 @@ BEGINNING = """\
 # Reference set
 
 These builds are references for comparisons with other programs and machines. `tools/canon` builds
-them again and compares all digests and counts. `tools/canon --quick` takes only the small cases on
-generated scenes, which need no download. `reference.json` has the exact numbers, also for each
-level: octree nodes, DAG nodes, bytes and SHA-256. [docs/format.md](../../docs/format.md#levels)
+them again and compares all digests and counts. `tools/canon --quick` builds only generated scenes
+at resolutions below 4096, which need no download. `reference.json` has the exact numbers, also for
+each level: octree nodes, DAG nodes, bytes and SHA-256.
+[docs/format.md](../../docs/format.md#levels)
 defines the levels.
 
-`tools/canon --write` writes this page. CPU seconds and memory are of one build on this machine:
+`tools/canon --write` writes this page. CPU seconds and peak memory were measured in one build,
+while the machine also did other work:
 """
 
 
