@@ -186,6 +186,11 @@ void Command::threads_option(unsigned& value) {
   option("--threads", value, "worker threads (default: all cores)").range(1, 1024);
 }
 
+void Command::memory_option(std::string& value) {
+  option("--memory", value,
+         "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+}
+
 void Command::config_option() {
   app_->add_option_function<std::string>(
           "--config", [app = app_](const std::string& path) { read_config_file(path, *app); },

@@ -89,6 +89,8 @@ class Command {
   void quiet_flag(bool& value);
   // Adds --threads, 1 to 1024.
   void threads_option(unsigned& value);
+  // Adds the option --memory, whose value is the text of a size.
+  void memory_option(std::string& value);
   // Adds the option --config, which names a TOML or INI file. The file sets options that are not on
   // the command line.
   void config_option();

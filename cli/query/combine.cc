@@ -86,8 +86,7 @@ void declare(Command& command, CombineCommand& state) {
   command.flag("--clip", state.clip,
                "drop voxels that --offset moves out of the grid; otherwise they are an error");
   command.output_option("-o,--output", state.output, "the .vdag file to write").required();
-  command.option("--memory", state.memory,
-                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.memory_option(state.memory);
   command.threads_option(state.threads);
   command.flag("--force", state.force, "replace an existing file");
   command.quiet_flag(state.quiet);

@@ -152,8 +152,7 @@ void declare(Command& command, EditCommand& state) {
   command.flag("--clip", state.clip,
                "drop voxels that --paste puts outside of the grid; otherwise they are an error");
   command.output_option("-o,--output", state.output, "the .vdag file to write").required();
-  command.option("--memory", state.memory,
-                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.memory_option(state.memory);
   command.threads_option(state.threads);
   command.flag("--force", state.force, "replace an existing file");
   command.quiet_flag(state.quiet);

@@ -91,8 +91,7 @@ void declare(Command& command, ExtractCommand& state) {
   command.flag("--majority", state.majority,
                "set a cell of a coarser level if at least half of its voxels are set, not if any "
                "is (for solids)");
-  command.option("--memory", state.memory,
-                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.memory_option(state.memory);
   command.threads_option(state.threads);
   command.flag("--force", state.force, "replace an existing file");
   command.quiet_flag(state.quiet);

@@ -136,8 +136,7 @@ void declare(Command& command, PublishCommand& state) {
   command.flag("--gray", state.gray, "leave out the colors");
   command.option("--pack-size", state.pack_size,
                  "size of the files with tiles, such as 8MiB, the default");
-  command.option("--memory", state.memory,
-                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.memory_option(state.memory);
   command.threads_option(state.threads);
   command.quiet_flag(state.quiet);
   command.json_flag(state.json);

@@ -64,8 +64,7 @@ void declare(Command& command, ReorderCommand& state) {
               "first-parent: for fast reading; hash: for combine and edit, as a build writes it")
       .one_of({name_of(NodeOrder::kByFirstParent), name_of(NodeOrder::kByHash)})
       .show_default();
-  command.option("--memory", state.memory,
-                 "memory to use, such as 512MiB (default: half of the machine's; at least 64MiB)");
+  command.memory_option(state.memory);
   command.threads_option(state.threads);
   command.flag("--force", state.force, "replace an existing file");
   command.quiet_flag(state.quiet);
