@@ -15,6 +15,7 @@
 #include "scene/points/row_reader.h"
 #include "scene/surface_numbers.h"
 #include "scene/text/characters.h"
+#include "scene/text/other_formats.h"
 
 namespace voxdag::points {
 namespace {
@@ -135,7 +136,8 @@ bool is_text_points(const ReadableFile& file) {
   const auto columns = Columns::of_header(first);
   Columns::Values values{};
   if (columns && columns->read(take_line(text, is_complete), values)) return true;
-  return ends_like_text_points(file.path()) && !first.starts_with('{');
+  return ends_like_text_points(file.path()) && !first.starts_with('{') &&
+         describe_other_format(text).empty();
 }
 
 std::unique_ptr<TriangleSource> open_text_points(FileSystem&, std::unique_ptr<ReadableFile> file,

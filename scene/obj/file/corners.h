@@ -2,6 +2,7 @@
 // the end of the preceding statements if they are negative.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <string_view>
@@ -51,10 +52,27 @@ inline bool next_corner(std::string_view& arguments, Corner& out) {
   return arguments.empty() || is_blank(arguments.front());
 }
 
-// True if the first corner has texture coordinates.
-inline bool has_texture(std::string_view arguments) {
-  Corner corner;
-  return has_word(arguments) && next_corner(arguments, corner) && corner.texture != 0;
+// What a pass over the file must know about the corners of a face.
+struct FaceCorners {
+  size_t count = 0;  // number of corners
+  bool lacks_texture =
+      false;  // true if a corner has no texture coordinates, or an index before the first
+  int64_t max_texture = 0;  // the largest index of texture coordinates, which counts from 1
+};
+
+// `texcoords`: the number of vt statements before the face. A word that is not a corner is counted
+// as a corner without texture coordinates.
+inline FaceCorners scan_corners(std::string_view arguments, uint64_t texcoords) {
+  FaceCorners out;
+  for (; has_word(arguments); ++out.count) {
+    Corner corner;
+    const bool is_corner = next_corner(arguments, corner);
+    while (!arguments.empty() && !is_blank(arguments.front())) arguments.remove_prefix(1);
+    const bool is_before_first = corner.texture + static_cast<int64_t>(texcoords) < 0;
+    out.lacks_texture |= !is_corner || corner.texture == 0 || is_before_first;
+    out.max_texture = std::max(out.max_texture, corner.texture);
+  }
+  return out;
 }
 
 // Converts an index of the file, which counts from 1 or from the end, to an index that counts from

@@ -52,6 +52,7 @@ class ObjFile::Scan {
 
   IgnoredStatements points_or_lines, unknown, small_faces, unnamed_materials, unnamed_libraries;
   bool has_polygons = false;  // true if a face has more than three corners
+  uint64_t max_texture = 0;   // the largest index of texture coordinates, which counts from 1
 
  private:
   void read(const Statement& statement) {
@@ -106,13 +107,14 @@ class ObjFile::Scan {
                             obj_.texcoords_,
                             material_});
     ++obj_.faces_;
-    const size_t corners = count_words(statement.arguments);
-    if (corners < 3) return add_small_face(statement);
-    obj_.triangles_ += corners - 2;
-    has_polygons = has_polygons || corners > 3;
+    const FaceCorners corners = scan_corners(statement.arguments, obj_.texcoords_);
+    if (corners.count < 3) return add_small_face(statement);
+    obj_.triangles_ += corners.count - 2;
+    has_polygons = has_polygons || corners.count > 3;
+    max_texture = std::max(max_texture, static_cast<uint64_t>(corners.max_texture));
     UsedMaterials::Use& use = obj_.materials_.all()[material_];
     ++use.faces;
-    if (!has_texture(statement.arguments)) ++use.faces_without_texture;
+    if (corners.lacks_texture) ++use.faces_without_texture;
   }
 
   // Adds a face of fewer than three corners, which sets no voxels. Refuses the file if a corner is
@@ -170,6 +172,7 @@ ObjFile::ObjFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget,
   Scan scan(*this, budget, cancel);
   scan.run();
   add_warnings(scan);
+  if (scan.max_texture > texcoords_) count_faces_without_texture(budget, cancel);
   if (scan.has_polygons) find_splits(budget, cancel);
 }
 
@@ -191,6 +194,23 @@ void ObjFile::add_warnings(const Scan& scan) {
   const std::string unknown =
       "the unknown statement \"" + printable(scan.unknown.keyword) + "\" is ignored";
   add("unknown-statements", scan.unknown, unknown.c_str());
+}
+
+// Counts the faces of each material that lack texture coordinates again. The first pass cannot know
+// that an index exceeds the number of all vt statements, because some may follow the face.
+void ObjFile::count_faces_without_texture(MemoryBudget& budget, const CancelToken& cancel) {
+  for (UsedMaterials::Use& use : materials_.all()) use.faces_without_texture = 0;
+  PolygonReader polygons(*this, budget);
+  polygons.seek(face_index_.at(0), 0);
+  for (uint64_t face = 0; face < faces_; ++face) {
+    if (face % kStatementsPerCheck == 0) cancel.check();
+    polygons.next();
+    if (polygons.size() < 3) continue;
+    bool lacks_texture = false;
+    for (size_t k = 0; k < polygons.size(); ++k)
+      lacks_texture = lacks_texture || polygons.texcoord(k) >= texcoords_;
+    if (lacks_texture) ++materials_.all()[polygons.material()].faces_without_texture;
+  }
 }
 
 // Sets has_splits for each block with a face that cannot be triangulated as a fan around its first

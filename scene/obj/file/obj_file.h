@@ -65,6 +65,7 @@ class ObjFile {
   class Scan;
 
   void add_warnings(const Scan& scan);
+  void count_faces_without_texture(MemoryBudget& budget, const CancelToken& cancel);
   void find_splits(MemoryBudget& budget, const CancelToken& cancel);
 
   const std::unique_ptr<ReadableFile> file_;

@@ -19,7 +19,7 @@ class UsedMaterials {
     std::string name;
     uint64_t line = 0;   // number of the first line that uses the name
     uint64_t faces = 0;  // number of faces with this material
-    // Number of these faces whose first corner has no texture coordinates.
+    // Number of these faces with a corner whose texture coordinates are missing or do not exist.
     uint64_t faces_without_texture = 0;
   };
 

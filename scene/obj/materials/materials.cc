@@ -96,8 +96,8 @@ class MaterialList {
     result_.scene.materials[number].image = image_of(entry);
     if (use.faces_without_texture > 0)
       warn("missing-texture-coordinates", use,
-           "a face has no texture coordinates, which the map_Kd of the material needs; its Kd is "
-           "used alone",
+           "a face has no texture coordinates, or an index of them without a vt statement; its "
+           "triangles without coordinates have the color Kd, without the map_Kd",
            use.faces_without_texture);
     return out;
   }

@@ -1,5 +1,6 @@
 #include "scene/obj/materials/mtl_reader.h"
 
+#include <algorithm>
 #include <unordered_map>
 
 #include "scene/messages.h"
@@ -26,6 +27,8 @@ class LibraryReader {
         begin_material(trimmed(arguments));
       else if (current_ != kNone)
         read_statement(keyword, trimmed(arguments));
+      else if (is_color_statement(keyword))
+        warn("missing-material", printable(keyword) + " precedes the first newmtl; it is ignored");
     }
     return std::move(materials_);
   }
@@ -33,6 +36,13 @@ class LibraryReader {
  private:
   static constexpr size_t kNone = ~size_t{0};
   static constexpr uint64_t kNodeBytes = 96;  // bytes of a hash table's node
+
+  // True if read_statement() reads the statement.
+  static bool is_color_statement(std::string_view keyword) {
+    constexpr std::string_view kKeywords[] = {"Kd", "d", "Tr", "map_Kd", "map_d"};
+    return std::ranges::any_of(
+        kKeywords, [&](std::string_view name) { return equals_in_any_case(keyword, name); });
+  }
 
   void begin_material(std::string_view name) {
     if (name.empty()) warn("missing-material", "newmtl has no name; no face can use its material");

@@ -100,6 +100,9 @@ TEST(UnknownFile, OtherTextsAreNotPoints) {
               HasSubstr("is a web page"));
   EXPECT_THAT(error_of_text("OFF\n8 6 0\n").message(), HasSubstr("is an OFF file"));
   EXPECT_THAT(error_of_text("# .PCD v.7\nVERSION .7\n").message(), HasSubstr("is a PCD point"));
+  EXPECT_THAT(error_of_text("2\n0 0 0 9 255 0 0\n1 0 0 9 0 0 0\n").message(),
+              HasSubstr("is a PTS point cloud"));
+  EXPECT_THAT(error_of_text("2\n2\n0 0 0\n1 0 0\n").message(), HasSubstr("is a PTX point cloud"));
   EXPECT_EQ(error_of_text("OFFSET,x,y,z\n9,1,2,3\n").message(), "");
   EXPECT_EQ(error_of_text("MM,x,y,z\n9,1,2,3\n").message(), "");
 }

@@ -217,6 +217,9 @@ TEST(Obj, LibrariesThatAreNoText) {
               ElementsAre(HasSubstr("is text in UTF-16LE: convert it first")));
   EXPECT_THAT(warnings_of_library("newmtl a\n\x01\n"), ElementsAre(HasSubstr("is not a text")));
   EXPECT_TRUE(warnings_of_library("newmtl a\nKd 1 0 0\n\x1a" + zero).empty());
+  EXPECT_THAT(warnings_of_library("Ns 3\nKd 1 0 0\nmap_kd a.png\nnewmtl a\n"),
+              ElementsAre(HasSubstr("line 2: Kd precedes the first newmtl; it is ignored"),
+                          HasSubstr("line 3: map_kd precedes the first newmtl")));
   EXPECT_THAT(warnings_of_library("newmtl \nnewmtl a\nd x\nTr\nmap_Kd -s 1 1 1\n"),
               ElementsAre(HasSubstr("line 1: newmtl has no name"),
                           HasSubstr("line 3: d has x, expected a number; it is ignored"),
@@ -279,6 +282,26 @@ TEST(Obj, TextureCoordinatesRunUpward) {
               ElementsAre(HasSubstr("a.mtl: line 5: the options -cc of map_Kd are ignored"),
                           HasSubstr("\"wood\": its Kd is black"),
                           HasSubstr("\"wood\": a face has no texture coordinates")));
+  EXPECT_EQ(materials.warnings.list()[2].count, 2u);
+}
+
+// Returns the number of faces that the warning missing-texture-coordinates counts.
+uint64_t count_without_texture(const std::string& faces) {
+  const WithLibraries open("mtllib a.mtl\n" + kTriangleLines + "v 1 1 0\nusemtl a\n" + faces,
+                           {{"folder/a.mtl", "newmtl a\nmap_Kd a.png\n"}, {"folder/a.png", ""}});
+  const SceneMaterials materials = open.source->materials();
+  for (const Warning& warning : materials.warnings.list())
+    if (warning.code == "missing-texture-coordinates") return warning.count;
+  return 0;
+}
+
+// kTriangleLines has three vt statements.
+TEST(Obj, FacesWithoutTextureAreCounted) {
+  EXPECT_EQ(count_without_texture("f 1/1 2/2 3/3\nf 1/-3 2/-2 3/-1\n"), 0u);
+  EXPECT_EQ(count_without_texture("f 1/4 2/2 3/3\nvt 0 0\n"), 0u);
+  EXPECT_EQ(count_without_texture("f 1/1 2/2 3\nf 1 2 3\nf 1/1 2/2 4/0\n"), 3u);
+  EXPECT_EQ(count_without_texture("f 1/-4 2/-2 3/-1\nf 1/1 2/2 3/3\n"), 1u);
+  EXPECT_EQ(count_without_texture("f 1/1 2/4 3/3\nf 1/1 2/2 3/3\nf 1/5 2/2 4/1 3/3\nvt 0 0\n"), 1u);
 }
 
 TEST(Obj, MissingFilesAreWarnings) {
