@@ -131,13 +131,14 @@ bool is_text_points(const ReadableFile& file) {
   std::string_view text = is_complete ? without_end_marks(begin) : begin;
   if (text.find('\0') != std::string_view::npos) return false;
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  const std::string_view whole = text;
   const std::string_view first = take_line(text, is_complete);
   if (count_numbers(first) >= 3) return true;
   const auto columns = Columns::of_header(first);
   Columns::Values values{};
   if (columns && columns->read(take_line(text, is_complete), values)) return true;
   return ends_like_text_points(file.path()) && !first.starts_with('{') &&
-         describe_other_format(text).empty();
+         describe_other_format(whole).empty();
 }
 
 std::unique_ptr<TriangleSource> open_text_points(FileSystem&, std::unique_ptr<ReadableFile> file,
