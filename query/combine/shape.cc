@@ -17,8 +17,9 @@ constexpr double kMaxLength = 1 << 24;  // so that sums of squares have less tha
 [[noreturn]] void refuse_shape(const std::string& text) {
   throw Error(ErrorCode::kInvalidInput,
               "shape '" + text +
-                  "': expected sphere:X,Y,Z,R with multiples of 0.5, or box:X0,Y0,Z0,X1,Y1,Z1 with "
-                  "whole numbers, in voxels of at most 16777216");
+                  "': expected, in voxels, sphere:X,Y,Z,R (multiples of 0.5 from -16777216 to "
+                  "16777216, R at least 0) or box:X0,Y0,Z0,X1,Y1,Z1 (whole numbers, X0 < X1, "
+                  "Y0 < Y1, Z0 < Z1)");
 }
 
 // Converts a number of voxels to half voxels. Refuses a number that is too large or not a multiple

@@ -34,7 +34,8 @@ void PackWriter::begin_band(bool is_color, uint32_t level) {
 
 void PackWriter::add_block(std::string_view bytes, uint64_t items, uint64_t code) {
   if (bytes.size() > std::numeric_limits<uint16_t>::max())
-    throw Error(ErrorCode::kLimit, "a block of the package has " + std::to_string(bytes.size()) +
+    throw Error(ErrorCode::kLimit, folder_ + ": a block of the package has " +
+                                       std::to_string(bytes.size()) +
                                        " bytes: expected at most 65535");
   const uint64_t limit =
       index_.packs.empty() ? std::min(kFirstPackBytes, pack_bytes_) : pack_bytes_;

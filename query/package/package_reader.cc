@@ -93,7 +93,10 @@ void PackageReader::place_blocks(const std::string& directory) {
         gunzip_block(std::string_view(directory).substr(at, page.bytes), kMaxBlockBytes);
     at += page.bytes;
     if (plain.size() != kDirectoryEntryBytes * count + kCodeBytes * colored)
-      throw Error(ErrorCode::kCorrupt, "a page has too few or too many entries");
+      throw Error(ErrorCode::kCorrupt, "page " + std::to_string(first / kPageBlocks) + " has " +
+                                           std::to_string(plain.size()) +
+                                           " bytes, expected the entries of " +
+                                           std::to_string(count) + " blocks");
     size_t low = kDirectoryEntryBytes * count, high = low + 4 * colored;
     for (uint64_t i = 0; i < count; ++i, ++in_pack) {
       if (in_pack == index_.packs[pack].blocks) {
@@ -109,12 +112,18 @@ void PackageReader::place_blocks(const std::string& directory) {
       }
       offset += place.bytes;
       if (offset > index_.packs[pack].bytes)
-        throw Error(ErrorCode::kCorrupt, "the blocks exceed their pack");
+        throw Error(ErrorCode::kCorrupt, "block " + std::to_string(places_.size()) +
+                                             " ends after its pack, expected an end "
+                                             "within the " +
+                                             std::to_string(index_.packs[pack].bytes) +
+                                             " bytes of the pack");
       places_.push_back(place);
     }
     const Place& begin = places_[first];
     if (begin.pack != page.pack || begin.offset != page.offset || begin.code != page.code)
-      throw Error(ErrorCode::kCorrupt, "a page begins at another block than its index says");
+      throw Error(ErrorCode::kCorrupt, "page " + std::to_string(first / kPageBlocks) +
+                                           " begins at another block than its entry in the "
+                                           "index says, expected the same block");
   }
 }
 
@@ -212,7 +221,10 @@ void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
     naming_file(name_of(at), [&] {
       const std::vector<CodedPage> pages = decode_color_block(bytes);
       if (pages[0].code != places_[at].code || (count > 0 && pages[0].code <= last))
-        throw Error(ErrorCode::kCorrupt, "its first page is not the page of the directory");
+        throw Error(ErrorCode::kCorrupt, "its first page has the code " +
+                                             std::to_string(pages[0].code) + ", expected " +
+                                             std::to_string(places_[at].code) +
+                                             " as in the directory, and increasing codes");
       last = pages.back().code;
       count += pages.size();
     });

@@ -209,7 +209,8 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
     level.rows = source.get<uint64_t>();
     level.children = source.get<uint64_t>();
     if (level.level != index.shape.brick_level() - i)
-      corrupt(where, "level " + std::to_string(level.level) + ", expected level " +
+      corrupt(where, "entry " + std::to_string(i) + " of the levels in the index is level " +
+                         std::to_string(level.level) + ", expected level " +
                          std::to_string(index.shape.brick_level() - i));
     frames_of_levels += frame_counts.back();
     index.levels.push_back(std::move(level));

@@ -32,8 +32,8 @@ std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& r
 }  // namespace
 
 ArtifactReader::ArtifactReader(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref)
-    : file_(std::move(segment)) {
-  const std::string where = file_->path() + ", artifact at byte " + std::to_string(ref.offset);
+    : file_(std::move(segment)),
+      place_(file_->path() + ", artifact at byte " + std::to_string(ref.offset)) {
   if (file_->size() < kSegmentHeaderBytes)
     throw Error(ErrorCode::kCorrupt, file_->path() + " has " + std::to_string(file_->size()) +
                                          " bytes: expected a segment header of " +
@@ -41,7 +41,7 @@ ArtifactReader::ArtifactReader(std::shared_ptr<ReadableFile> segment, const Arti
   std::byte header[kSegmentHeaderBytes];
   file_->read_at(0, header);
   check_segment_header(header, ref.segment, file_->path());
-  ArtifactIndex index = decode_index(read_index(*file_, ref, where), ref, where);
+  ArtifactIndex index = decode_index(read_index(*file_, ref, place_), ref, place_);
   shape_ = index.shape;
   roots_ = std::move(index.roots);
   levels_ = std::move(index.levels);
@@ -54,7 +54,7 @@ const ArtifactLevel* ArtifactReader::level(uint32_t level) const {
 }
 
 void ArtifactReader::damaged(uint32_t level, size_t frame, const std::string& what) const {
-  throw Error(ErrorCode::kCorrupt, file_->path() + ", level " + std::to_string(level) + ", frame " +
+  throw Error(ErrorCode::kCorrupt, place_ + ", level " + std::to_string(level) + ", frame " +
                                        std::to_string(frame) + ": " + what);
 }
 

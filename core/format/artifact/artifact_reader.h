@@ -21,6 +21,8 @@ class ArtifactReader {
   // Error{kUnsupportedVersion}.
   ArtifactReader(std::shared_ptr<ReadableFile> segment, const ArtifactRef& ref);
 
+  // Returns the segment's path and the artifact's offset in it, for messages.
+  const std::string& place() const { return place_; }
   const DagShape& shape() const { return shape_; }
   std::span<const ArtifactRoot> roots() const { return roots_; }
   // The levels of the artifact, from the bricks upwards: levels()[0] is level L-2.
@@ -35,6 +37,7 @@ class ArtifactReader {
   [[noreturn]] void damaged(uint32_t level, size_t frame, const std::string& what) const;
 
   std::shared_ptr<ReadableFile> file_;
+  std::string place_;
   DagShape shape_;
   std::vector<ArtifactRoot> roots_;
   std::vector<ArtifactLevel> levels_;

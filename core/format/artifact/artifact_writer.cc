@@ -32,12 +32,12 @@ struct ArtifactWriter::State {
     children.reserve(8 * kFrameRows);
   }
 
-  [[noreturn]] void broken(const std::string& what) const {
+  [[noreturn]] void fail(ErrorCode code, const std::string& what) const {
     const std::string level =
         index.levels.empty() ? "" : ", level " + std::to_string(index.levels.back().level);
-    throw Error(ErrorCode::kCorrupt,
-                "artifact for segment " + std::to_string(segment.id()) + level + ": " + what);
+    throw Error(code, "artifact for segment " + std::to_string(segment.id()) + level + ": " + what);
   }
+  [[noreturn]] void broken(const std::string& what) const { fail(ErrorCode::kCorrupt, what); }
 
   void add_frame(std::span<const std::byte> bytes, uint64_t first_hash, size_t rows,
                  size_t child_count) {
@@ -56,9 +56,8 @@ struct ArtifactWriter::State {
     level.rows += rows;
     level.children += child_count;
     if (level.rows > uint64_t{1} << 32)
-      throw Error(ErrorCode::kLimit, "level " + std::to_string(level.level) +
-                                         " of an artifact has " + std::to_string(level.rows) +
-                                         " nodes: expected at most 2^32");
+      fail(ErrorCode::kLimit,
+           "it has " + std::to_string(level.rows) + " nodes, expected at most 2^32");
   }
 
   void add_brick_frame(std::span<const uint64_t> rows);

@@ -347,7 +347,7 @@ void check_compressed(const Document& d, const BufferView& view, const std::stri
                        " bytes of buffer " + std::to_string(from.buffer));
   if (source.kind == BufferSource::Kind::kNone)
     refuse(d.path, what + ": buffer " + std::to_string(from.buffer) +
-                       " has no uri and is not in the file, expected one of both");
+                       " has no uri and is not in the file, expected one of the two");
   if (!(buffer.meshopt ? kHasMeshopt : kHasDraco))
     refuse(d.path, where + " is compressed by " + name +
                        ", which this voxdag was built without: decompress the file (gltf-transform "

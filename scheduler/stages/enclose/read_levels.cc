@@ -56,10 +56,7 @@ class LevelsReader {
     const auto roots = artifact_.roots();
     const auto root =
         std::ranges::find_if(roots, [&](const ArtifactRoot& r) { return contains(r.cube, cube); });
-    if (root == roots.end())
-      throw Error(
-          ErrorCode::kCorrupt,
-          "an artifact has no root in the cube of its subvolume: start over with --restart");
+    if (root == roots.end()) refuse("no root is in the cube of the artifact's subvolume");
     uint32_t row = root->index;
     for (uint32_t level = root->cube.level; level < cube.level; ++level) {
       const auto child = child_row(level, row, ancestor(cube, level + 1).child_index());
@@ -83,11 +80,15 @@ class LevelsReader {
   }
 
  private:
+  [[noreturn]] void refuse(const std::string& problem) const {
+    throw Error(ErrorCode::kCorrupt, artifact_.place() + ": " + problem +
+                                         ", expected a complete artifact; start over with "
+                                         "--restart");
+  }
+
   const ArtifactLevel& level(uint32_t number) const {
     const ArtifactLevel* const level = artifact_.level(number);
-    if (level == nullptr)
-      throw Error(ErrorCode::kCorrupt, "an artifact lacks level " + std::to_string(number) +
-                                           ": start over with --restart");
+    if (level == nullptr) refuse("level " + std::to_string(number) + " is missing");
     return *level;
   }
 
@@ -95,8 +96,7 @@ class LevelsReader {
     const auto& frames = level(number).frames;
     const auto after = std::ranges::upper_bound(frames, uint64_t{row}, {}, &FrameInfo::first_row);
     if (after == frames.begin())
-      throw Error(ErrorCode::kCorrupt,
-                  "an artifact has no row for one of its roots: start over with --restart");
+      refuse("level " + std::to_string(number) + " has no frame of row " + std::to_string(row));
     const size_t frame = static_cast<size_t>(after - frames.begin()) - 1;
     artifact_.read_frame(number, frame, frame_);
     size_t at = 0;

@@ -32,11 +32,11 @@ class ArtifactRows {
     const auto root = std::find_if(roots.begin(), roots.end(),
                                    [&](const ArtifactRoot& r) { return r.cube == cube; });
     if (root == roots.end())
-      throw Error(ErrorCode::kCorrupt,
-                  "an artifact does not contain its subvolume of level " +
-                      std::to_string(cube.level) + " at " + std::to_string(cube.position[0]) + " " +
-                      std::to_string(cube.position[1]) + " " + std::to_string(cube.position[2]) +
-                      ": expected its root");
+      throw Error(ErrorCode::kCorrupt, reader_.place() + ": no root is the subvolume of level " +
+                                           std::to_string(cube.level) + " at " +
+                                           std::to_string(cube.position[0]) + " " +
+                                           std::to_string(cube.position[1]) + " " +
+                                           std::to_string(cube.position[2]) + ", expected one");
     const uint32_t bricks = reader_.shape().brick_level();
     if (cube.level == bricks) return brick(root->index);
     const Frame& frame = frame_of(cube.level, root->index);
@@ -60,10 +60,10 @@ class ArtifactRows {
   const Frame& frame_of(uint32_t level, uint32_t row) {
     const ArtifactLevel* const info = reader_.level(level);
     if (!info || row >= info->rows)
-      throw Error(ErrorCode::kCorrupt, "an artifact has " + std::to_string(info ? info->rows : 0) +
-                                           " rows in its level " + std::to_string(level) +
-                                           ": expected row " + std::to_string(row) +
-                                           ", to which a node or the root refers");
+      throw Error(ErrorCode::kCorrupt,
+                  reader_.place() + ": it has " + std::to_string(info ? info->rows : 0) +
+                      " rows in its level " + std::to_string(level) + ": expected row " +
+                      std::to_string(row) + ", to which a node or the root refers");
     Held& held = held_[level];
     if (held.index != row / kFrameRows) {
       held.index.reset();
