@@ -39,9 +39,9 @@ class LibraryReader {
 
   // True if read_statement() reads the statement.
   static bool is_color_statement(std::string_view keyword) {
-    constexpr std::string_view kKeywords[] = {"Kd", "d", "Tr", "map_Kd", "map_d"};
+    constexpr std::string_view kColorKeywords[] = {"Kd", "d", "Tr", "map_Kd", "map_d"};
     return std::ranges::any_of(
-        kKeywords, [&](std::string_view name) { return equals_in_any_case(keyword, name); });
+        kColorKeywords, [&](std::string_view name) { return equals_in_any_case(keyword, name); });
   }
 
   void begin_material(std::string_view name) {
