@@ -23,15 +23,12 @@ constexpr uint64_t kColorResolution = 4096;
 
 bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"output\": \""); }
 
-void check_solid(const RunOptions& run, SolidName rule) {
+// Throws Error if the backend does not fill solids.
+void check_solid(const RunOptions& run) {
   if (run.backend == BackendName::kCuda || run.backend == BackendName::kParallelHost)
     throw Error(ErrorCode::kInvalidInput, std::string("backend ") + name_of(run.backend) +
                                               ": it does not fill solids; expected --backend cpu "
                                               "or auto");
-  if (run.cluster)
-    throw Error(ErrorCode::kInvalidInput,
-                std::string("'solid': the tasks of a cluster do not fill solids by ") +
-                    name_of(rule) + ": expected enclosed, or no cluster");
 }
 
 }  // namespace
@@ -45,7 +42,7 @@ BuildSpec checked(const BuildSpec& spec) {
   check_options(spec);
   choose_grid(g, WorldBounds{});  // throws if no grid has these bounds or this voxel size
   check_backend(r, g.rule());
-  if (solid_rule_of(g) != SolidRule::kNone) check_solid(r, g.solid);
+  if (solid_rule_of(g) != SolidRule::kNone) check_solid(r);
   if (r.report == "none" && r.cluster && r.cluster->merge_job)
     throw Error(ErrorCode::kInvalidInput,
                 "--report none: expected a report with --cluster-merge, because the merge job "

@@ -183,9 +183,9 @@ void refuse_stored_warnings(BuildJob& job) {
 }
 
 // Adds the numbers of a solid's interior voxels and sample rows to the report. Reports the warning
-// of solid_warning(), if any.
+// of solid_warning(), if any. Does nothing if a merge job will wait for the subvolumes.
 void report_solid(BuildJob& job) {
-  if (!job.has_rows()) return;
+  if (!job.has_rows() || !job.planned().empty()) return;
   uint64_t interior = 0, disputed = 0;
   for (const StoredSubvolume& subvolume : job.store->leaves()) {
     interior += subvolume.summary.interior;

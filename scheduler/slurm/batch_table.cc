@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "core/base/parallel_for.h"
@@ -23,6 +24,7 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
   const bool has_cluster = cluster_.job.spec.run.cluster.has_value();
   if (earlier && earlier->scene_digest == scene_digest && earlier->shape == shape &&
       earlier->rule == cluster_.job.spec.geometry.rule() &&
+      earlier->solid == solid_rule_of(cluster_.job.spec.geometry) &&
       (earlier->program == cluster_.options.program_version || !has_cluster)) {
     state_ = *earlier;
   } else {
@@ -53,6 +55,7 @@ void BatchTable::start_new(const std::string& scene_digest, const DagShape& shap
   state_.scene_digest = scene_digest;
   state_.shape = shape;
   state_.rule = cluster_.job.spec.geometry.rule();
+  state_.solid = solid_rule_of(cluster_.job.spec.geometry);
 }
 
 bool BatchTable::is_valid(const OpenBatch& batch) const {
@@ -83,7 +86,7 @@ void BatchTable::add(std::span<const StoredSubvolume> subvolumes, std::span<cons
   for (const size_t i : order) {
     const StoredSubvolume& subvolume = subvolumes[i];
     rows_[subvolume.id] = subvolume;
-    ordered.push_back({subvolume.id, subvolume.cube, subvolume.weight, triangles.count(bins[i])});
+    ordered.push_back(item_of(subvolume, triangles.count(bins[i])));
     ordered_bins.push_back(bins[i]);
     weight += subvolume.weight;
   }
@@ -93,7 +96,9 @@ void BatchTable::add(std::span<const StoredSubvolume> subvolumes, std::span<cons
   batch.shape = state_.shape;
   batch.rule = state_.rule;
   batch.wide = triangles.record_bytes() == triangle_record_bytes(true);
-  batch.backend = run.backend;
+  batch.solid = state_.solid;
+  // The CPU backend is the only backend that fills solids.
+  batch.backend = cluster_.job.rows ? BackendName::kCpu : run.backend;
   batch.method = run.method;
   if (run.subvolume_edge) batch.longest_edge = static_cast<int64_t>(run.subvolume_edge);
   CutBatches cut =
@@ -103,6 +108,16 @@ void BatchTable::add(std::span<const StoredSubvolume> subvolumes, std::span<cons
   open_batches(std::move(cut), ordered_bins, triangles, run.threads, [&] { progress.advance(1); });
   progress.end_stage();
   save();
+}
+
+// Returns the subvolume as an item of a batch, with its rows if the build is a solid.
+BatchSubvolume BatchTable::item_of(const StoredSubvolume& subvolume, uint64_t triangles) const {
+  BatchSubvolume item{subvolume.id, subvolume.cube, subvolume.weight, triangles, {}, {}};
+  if (!cluster_.job.rows) return item;
+  const SubvolumeRows rows = cluster_.job.rows->find(subvolume.cube);
+  item.unit = rows.unit;
+  item.views.assign(std::begin(rows.views), std::end(rows.views));
+  return item;
 }
 
 // Returns the number of tasks for subvolumes of this total weight: the subvolumes' share of
@@ -126,12 +141,13 @@ void BatchTable::open_batches(CutBatches cut, std::span<const BinId> bins,
                                        std::to_string(state_.next_batch + cut.batches.size() - 1) +
                                        ": expected less than " + std::to_string(kMaxBatches) +
                                        "; start over (--restart)");
+  SolidRows* const rows = cluster_.job.rows.get();
   parallel_for(threads, cut.batches.size(), [&](unsigned, size_t i) {
     const Batch& batch = cut.batches[i];
     write_batch(
         cluster_.files(), cluster_.folder.batch_path(batch.number), batch,
         [&](size_t item) { return triangles.open(bins[cut.first_items[i] + item]); },
-        cluster_.job.context.cancel);
+        rows ? &rows->file() : nullptr, cluster_.job.context.cancel);
     after_each();
   });
   state_.next_batch += static_cast<uint32_t>(cut.batches.size());
@@ -159,18 +175,22 @@ std::vector<uint32_t> BatchTable::split_file(uint32_t number) {
   Batch like = file->batch();
   MemoryBudget budget(job.spec.run.memory_bytes / 4);
   MemoryStore triangles(cluster_.files(), job.work.spill_path(), like.wide, budget);
-  std::vector<BinId> bins = file->copy_to(triangles, job.context.cancel);
+  std::vector<BinId> bins = file->copy_to(triangles, nullptr, job.context.cancel);
   file.reset();  // close the file, which is removed below
   std::vector<BatchSubvolume> parts = std::exchange(like.subvolumes, {});
+  if (job.rows)
+    for (BatchSubvolume& part : parts) part = item_of(rows_.at(part.id), part.triangles);
   if (parts.size() == 1) {
-    const auto octants =
-        split_subvolume({rows_.at(parts[0].id), bins[0]}, state_.shape.grid_levels, triangles,
-                        *job.store, job.context.progress, job.context.cancel);
+    std::optional<SplitSolid> solid;
+    if (job.rows) solid.emplace(SplitSolid{*job.rows, job.budget});
+    const auto octants = split_subvolume({rows_.at(parts[0].id), bins[0]}, state_.shape.grid_levels,
+                                         triangles, *job.store, job.context.progress,
+                                         job.context.cancel, solid ? &*solid : nullptr);
     parts.clear();
     bins.clear();
     for (const auto& [octant, bin] : octants) {
       rows_[octant.id] = octant;
-      parts.push_back({octant.id, octant.cube, octant.weight, triangles.count(bin)});
+      parts.push_back(item_of(octant, triangles.count(bin)));
       bins.push_back(bin);
     }
   }

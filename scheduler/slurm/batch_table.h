@@ -71,6 +71,7 @@ class BatchTable {
  private:
   bool is_valid(const OpenBatch& batch) const;
   void start_new(const std::string& scene_digest, const DagShape& shape);
+  BatchSubvolume item_of(const StoredSubvolume& subvolume, uint64_t triangles) const;
   uint64_t tasks_for(double weight, uint64_t subvolumes) const;
   void open_batches(CutBatches cut, std::span<const BinId> bins, const TriangleStore& triangles,
                     unsigned threads, const std::function<void()>& after_each);

@@ -195,7 +195,12 @@ class Task {
     MemoryBudget triangle_budget(MemoryPlan::divide(budget.limit()).triangle_bytes, &budget);
     MemoryStore triangles(context_.files, temporary + "/triangles.vdspill", batch.wide,
                           triangle_budget);
-    const std::vector<BinId> bins = file.copy_to(triangles, context_.cancel);
+    SolidRows rows(context_.files, temporary + "/rows.vddurable", batch.solid,
+                   batch.shape.grid_levels, batch.build);
+    const bool is_solid = batch.solid != SolidRule::kNone;
+    if (is_solid) rows.start();
+    const std::vector<BinId> bins =
+        file.copy_to(triangles, is_solid ? &rows : nullptr, context_.cancel);
     plan = jobs.leaves();
     std::vector<QueuedSubvolume> queue;
     for (size_t i = 0; i < plan.size(); ++i) queue.push_back({plan[i], bins[i]});
@@ -207,6 +212,7 @@ class Task {
     options.threads = std::min(run_options.threads, backend.max_workers);
     options.longest_edge = batch.longest_edge;
     options.open_backend = backend.open;
+    if (is_solid) options.rows = &rows;
     options.segment_folder = temporary;
     // Checkpoints are useless, because the temporary folder does not outlive this process.
     options.checkpoint_interval_s = 1e9;
@@ -240,6 +246,8 @@ class Task {
       summary.voxels += leaf.summary.voxels;
       summary.svo_nodes += leaf.summary.svo_nodes;
       summary.dag_nodes += leaf.summary.dag_nodes;
+      summary.interior += leaf.summary.interior;
+      summary.disputed += leaf.summary.disputed;
       summary.root_hash = is_complete ? leaf.summary.root_hash : 0;
     }
     if (inputs.artifacts.empty()) return;

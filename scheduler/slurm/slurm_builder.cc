@@ -15,6 +15,7 @@
 #include "scheduler/slurm/record_collector.h"
 #include "scheduler/slurm/task_poller.h"
 #include "scheduler/stages/partition/partition_stage.h"
+#include "scheduler/stages/rows/prepare_rows.h"
 
 namespace voxdag {
 namespace {
@@ -78,10 +79,12 @@ void SlurmBuilder::add_batches(PreparedScene& scene, std::span<const StoredSubvo
     added.push_back(subvolume);
     cubes.push_back(subvolume.cube);
   }
-  if (added.empty()) return;
+  const bool needs_rows = job_.rows && !job_.rows->is_ready();
+  if (added.empty() && !needs_rows) return;
   const std::vector<BinId> bins = partition_prepared(scene, cubes, job_.checkpoint, job_.stage());
   job_.clock.finish("partition");
-  batches_.add(added, bins, *scene.triangles);
+  prepare_rows(job_, added, bins, *scene.triangles);
+  if (!added.empty()) batches_.add(added, bins, *scene.triangles);
 }
 
 void SlurmBuilder::wait_for_batches() {

@@ -10,6 +10,7 @@
 // has the place of the last index. Thread-safe, except load() and start().
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -25,6 +26,8 @@
 
 namespace voxdag {
 
+constexpr std::array<const char*, 3> enum_names(SolidRule) { return {"", "winding", "parity"}; }
+
 // State of a subvolume in a solid. A unit is a maximal cube without voxels of the shell; it is
 // filled or left empty as one piece (core/geometry/solid_rule.h).
 enum class SolidUnit : uint32_t {
@@ -33,6 +36,8 @@ enum class SolidUnit : uint32_t {
   kEmpty,      // it has none: a planned subvolume, whose unit is in SolidRows::full_cubes if it is
                // inside the solid
 };
+
+constexpr std::array<const char*, 3> enum_names(SolidUnit) { return {"", "empty-unit", "empty"}; }
 
 struct SubvolumeRows {
   SolidUnit unit = SolidUnit::kShell;

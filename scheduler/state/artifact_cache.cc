@@ -21,12 +21,31 @@ constexpr uint64_t kContentVersion = 1;
 using Corner = std::array<int64_t, 3>;
 using Triangle = std::array<Corner, 3>;
 
-Triangle canonical(const FixedTriangle& triangle, const int64_t (&low)[3]) {
+// Returns the triangle relative to `low`, with its corners sorted. With `keeps_orientation`, the
+// corners are rotated instead, so that the smallest corner is the first.
+Triangle canonical(const FixedTriangle& triangle, const int64_t (&low)[3], bool keeps_orientation) {
   Triangle t;
   for (size_t i = 0; i < 3; ++i)
     for (size_t a = 0; a < 3; ++a) t[i][a] = triangle.v[i][a] - low[a];
-  std::sort(t.begin(), t.end());
+  if (keeps_orientation)
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  else
+    std::sort(t.begin(), t.end());
   return t;
+}
+
+template <class T>
+void add_items(Sha256& digest, std::span<const T> items) {
+  digest.add(std::as_bytes(items));
+}
+
+// Adds the data of a solid on which the voxels of a cube depend, except its triangles.
+void add_solid(Sha256& digest, const SolidEntry& solid, uint32_t grid_levels) {
+  const auto words = {static_cast<uint64_t>(solid.rule),
+                      static_cast<uint64_t>(solid_block_log2(grid_levels))};
+  add_items(digest, std::span<const uint64_t>(words));
+  for (const std::vector<int32_t>& views : solid.views)
+    add_items(digest, std::span<const int32_t>(views));
 }
 
 bool is_entry(const DirectoryEntry& entry) {
@@ -59,6 +78,7 @@ std::string ArtifactCache::partial_of(const std::string& key) {
 
 std::optional<std::string> ArtifactCache::key(const SubvolumeTask& task, TriangleStream& triangles,
                                               MemoryBudget& budget) {
+  const bool is_solid = task.solid != nullptr;
   MemoryCharge charge;
   std::vector<Triangle> content;
   try {
@@ -73,27 +93,29 @@ std::optional<std::string> ArtifactCache::key(const SubvolumeTask& task, Triangl
   triangles.rewind();
   std::array<FixedTriangle, 256> batch;
   while (const size_t n = triangles.read(batch))
-    for (size_t i = 0; i < n; ++i) content.push_back(canonical(batch[i], low));
+    for (size_t i = 0; i < n; ++i) content.push_back(canonical(batch[i], low, is_solid));
   std::sort(content.begin(), content.end());
-  content.erase(std::unique(content.begin(), content.end()), content.end());
+  if (!is_solid) content.erase(std::unique(content.begin(), content.end()), content.end());
 
   Sha256 digest;
   const uint64_t head[] = {kContentVersion, task.grid_levels - task.cube.level, task.hash_bits};
   digest.add(std::as_bytes(std::span(head)));
   if (task.rule != VoxelRule::kShell)
     digest.add(std::as_bytes(std::span(std::string_view(traits_of(task.rule).name))));
+  if (is_solid) add_solid(digest, *task.solid, task.grid_levels);
   digest.add(std::as_bytes(std::span(content)));
   triangles.rewind();
   return digest.finish();
 }
 
-bool ArtifactCache::find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
-                         SegmentWriter& segment) {
+bool ArtifactCache::find(const std::string& key, const SubvolumeTask& task,
+                         StoredSubvolume& subvolume, SegmentWriter& segment) {
   try {
-    const CacheEntry entry = read_cache_entry(files_, path_of(key), key);
+    const CacheEntry entry = read_cache_entry(files_, path_of(key), key, task.solid != nullptr);
     subvolume.artifact =
-        copy_artifact(*entry.file, entry.ref, subvolume.cube, grid_levels, segment);
-    subvolume.summary = {entry.root.voxels, entry.root.svo_nodes, entry.dag_nodes, entry.root.hash};
+        copy_artifact(*entry.file, entry.ref, subvolume.cube, task.grid_levels, segment);
+    subvolume.summary = {entry.root.voxels, entry.root.svo_nodes, entry.dag_nodes,
+                         entry.root.hash,   entry.solid.interior, entry.solid.disputed};
     mark_used(key);
     return true;
   } catch (const Error& error) {
@@ -111,13 +133,15 @@ void ArtifactCache::mark_used(const std::string& key) {
   }
 }
 
-void ArtifactCache::add(const std::string& key, const ReadableFile& segment,
-                        const ArtifactRef& artifact) {
+void ArtifactCache::add(const std::string& key, const SubvolumeTask& task,
+                        const ReadableFile& segment, const StoredSubvolume& built) {
+  std::optional<SolidCounts> solid;
+  if (task.solid != nullptr) solid = {built.summary.interior, built.summary.disputed};
   try {
     const std::string partial = partial_of(key);
     uint64_t bytes = 0;
     try {
-      bytes = write_cache_entry(files_, path_of(key), partial, key, segment, artifact);
+      bytes = write_cache_entry(files_, path_of(key), partial, key, segment, built.artifact, solid);
     } catch (const Error&) {
       files_.remove(partial);
       throw;

@@ -3,7 +3,10 @@
 //
 // The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube
 // (corners sorted within each triangle, triangles sorted, duplicates removed), the cube's edge, the
-// hash bits, the rule, and a version that increases whenever artifacts change. The cache is a
+// hash bits, the rule, and a version that increases whenever artifacts change. For a solid, the
+// triangles keep their orientation and their duplicates, and the content has the rule of the solid
+// and the views from the low faces of the cube (SolidEntry). The views are the only data from
+// outside the cube on which the voxels of a subvolume depend. The cache is a
 // folder with one file per entry. When the limit is exceeded, the least recently used entries are
 // removed. Several builds may share the cache: entries appear atomically, by renaming, and a
 // removed or damaged entry is a miss. Thread-safe.
@@ -32,10 +35,12 @@ class ArtifactCache {
                                         MemoryBudget& budget);
   // Copies the entry of `key` into `segment` and fills in the subvolume's artifact and summary.
   // Returns false if the entry is missing or damaged.
-  bool find(const std::string& key, uint32_t grid_levels, StoredSubvolume& subvolume,
+  bool find(const std::string& key, const SubvolumeTask& task, StoredSubvolume& subvolume,
             SegmentWriter& segment);
-  // Adds a flushed artifact of `segment`. Errors are ignored, because the cache is optional.
-  void add(const std::string& key, const ReadableFile& segment, const ArtifactRef& artifact);
+  // Adds the built subvolume, whose artifact is flushed in `segment`. Errors are ignored, because
+  // the cache is optional.
+  void add(const std::string& key, const SubvolumeTask& task, const ReadableFile& segment,
+           const StoredSubvolume& built);
 
  private:
   std::string path_of(const std::string& key) const { return folder_ + "/" + key + ".vdart"; }

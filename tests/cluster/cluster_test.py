@@ -191,7 +191,7 @@ class ClusterTest(unittest.TestCase):
                            "--cluster-retries", "1")
         # Another file replaces the batch's file, so every attempt reports it as damaged.
         batch = self.wait_for(lambda: sorted(self.work.glob("cluster/batch-*.vdbatch")), "batch")[0]
-        batch.write_bytes(b"vdbatch2" + bytes(100))
+        batch.write_bytes(b"vdbatch3" + bytes(100))
         _, messages = self.end(build)
         self.assertNotEqual(build.returncode, 0)
         self.assertIn("it has failed 2 times", messages)

@@ -1,8 +1,11 @@
 // Builds that share subvolumes through a cache. Unchanged subvolumes are copied from the cache,
 // which does not change the bytes of the file.
+#include <array>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
+#include "tests/oracle/solid/solids.h"
 #include "tests/reference/reference_build.h"
 
 namespace reference {
@@ -98,6 +101,109 @@ TEST_F(CacheTest, MissesWhatItMust) {
   for (const auto& entry : std::filesystem::directory_iterator(spec.run.cache_folder))
     bytes += entry.file_size();
   EXPECT_LE(bytes, spec.run.cache_bytes);
+}
+
+// A rectangle: its plane is at `at` along `axis`, in voxels, and faces the positive axis if
+// `is_positive`. `low` and `high` are its extents along the other two axes.
+struct Sheet {
+  int axis;
+  int64_t at;
+  std::array<int64_t, 2> low, high;
+  bool is_positive;
+};
+
+void add_sheet(const Sheet& sheet, Triangles& out) {
+  const auto corner = [&](bool first, bool second) {
+    oracle::Point p{};
+    const int u = (sheet.axis + 1) % 3, v = (sheet.axis + 2) % 3;
+    p[sheet.axis] = 256 * sheet.at + 129;
+    p[u] = 256 * (first ? sheet.high : sheet.low)[0] + 129;
+    p[v] = 256 * (second ? sheet.high : sheet.low)[1] + 129;
+    return p;
+  };
+  const oracle::Point a = corner(false, false), b = corner(true, false), c = corner(true, true),
+                      d = corner(false, true);
+  out.push_back(sheet.is_positive ? oracle::Triangle{a, b, c} : oracle::Triangle{a, c, b});
+  out.push_back(sheet.is_positive ? oracle::Triangle{a, c, d} : oracle::Triangle{a, d, c});
+}
+
+// Returns a tube along z that is open at both ends, a closed box, and a sheet far away from both.
+// The walls along x and y give the inside of the tube 4 of 6 views. The sheet takes one of these
+// views if the tube and the sheet have the same y: then the tube is not filled.
+Triangles tube_box_and_sheet(int64_t sheet_y) {
+  Triangles out;
+  const auto add_box = [&](std::array<int64_t, 3> low, std::array<int64_t, 3> high, int axes) {
+    for (int a = 0; a < axes; ++a) {
+      const int u = (a + 1) % 3, v = (a + 2) % 3;
+      for (const bool is_high : {false, true})
+        add_sheet({a, (is_high ? high : low)[a], {low[u], low[v]}, {high[u], high[v]}, is_high},
+                  out);
+    }
+  };
+  add_box({40, 40, 40}, {150, 150, 210}, 2);
+  add_box({300, 300, 300}, {450, 450, 450}, 3);
+  add_sheet({0, 480, {sheet_y, 20}, {sheet_y + 160, 230}, false}, out);
+  return out;
+}
+
+void expect_same_report(const voxdag::BuildReport& report, const voxdag::BuildReport& expected) {
+  EXPECT_EQ(report.sha256, expected.sha256);
+  ASSERT_TRUE(report.solid);
+  EXPECT_EQ(report.solid->interior, expected.solid->interior);
+  EXPECT_EQ(report.solid->disputed, expected.solid->disputed);
+  EXPECT_EQ(report.solid->open_rows, expected.solid->open_rows);
+}
+
+// Whether the tube is filled depends on a sheet in another part of the grid. After the sheet moves,
+// the subvolumes of the tube are built again, and the subvolumes of the box are not.
+TEST_F(CacheTest, ASolidDependsOnItsViews) {
+  for (const auto rule : {voxdag::SolidName::kWinding, voxdag::SolidName::kParity}) {
+    auto before = spec_for(tube_box_and_sheet(20), 512);
+    auto after = spec_for(tube_box_and_sheet(340), 512);
+    for (auto* spec : {&before, &after}) {
+      spec->geometry.solid = rule;
+      spec->run.subvolume_edge = 64;
+    }
+    const auto without_cache = run(before), moved = run(after);
+    EXPECT_GT(moved.solid->interior, without_cache.solid->interior + 1000000);
+    before.run.cache_folder = after.run.cache_folder = folder_.file("cache");
+    const auto first = run(before);
+    expect_same_report(first, without_cache);
+    const auto again = run(before);
+    expect_same_report(again, without_cache);
+    EXPECT_GT(again.subvolumes_cached, 50u);
+    const auto cached = run(after);
+    expect_same_report(cached, moved);
+    EXPECT_GT(cached.subvolumes_cached, 20u);
+    EXPECT_LT(cached.subvolumes_cached + 20, again.subvolumes_cached);
+    // The entries of the shell are different entries.
+    after.geometry.solid = voxdag::SolidName::kNone;
+    const auto shell = run(after);
+    after.run.cache_folder.clear();
+    EXPECT_EQ(run(after).sha256, shell.sha256);
+  }
+}
+
+// Triangles of a solid that occur twice, or with the other orientation, are other content.
+TEST_F(CacheTest, ASolidDependsOnOrientationAndCopies) {
+  const Triangles once = oracle::make_solid(oracle::SolidKind::kSphere, 3, 64);
+  Triangles twice = once, both = once;
+  twice.insert(twice.end(), once.begin(), once.end());
+  for (auto t : once) {
+    std::swap(t[0], t[1]);
+    both.push_back(t);
+  }
+  for (const auto rule : {voxdag::SolidName::kWinding, voxdag::SolidName::kParity})
+    for (const Triangles& scene : {once, twice, both}) {
+      auto spec = spec_for(scene, 64);
+      spec.geometry.solid = rule;
+      const auto expected = run(spec);
+      spec.run.cache_folder = folder_.file("cache");
+      expect_same_report(run(spec), expected);
+      const auto again = run(spec);
+      expect_same_report(again, expected);
+      EXPECT_EQ(again.subvolumes_cached, 1u);
+    }
 }
 
 }  // namespace

@@ -10,8 +10,10 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kEntryMagic = 0x0a48434147414456;  // "VDAGACH\n"
+constexpr uint64_t kEntryMagic = 0x0a48434147414456;       // "VDAGACH\n"
+constexpr uint64_t kSolidEntryMagic = 0x0a53434147414456;  // "VDAGACS\n"
 constexpr size_t kFooterBytes = 48;
+constexpr size_t kSolidFooterBytes = kFooterBytes + 16;
 constexpr uint64_t kChunkBytes = uint64_t{256} << 10;
 
 [[noreturn]] void corrupt_copy(const std::string& where, const std::string& what) {
@@ -74,8 +76,8 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
 }
 
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
-                           const std::string& key, const ReadableFile& from,
-                           const ArtifactRef& ref) {
+                           const std::string& key, const ReadableFile& from, const ArtifactRef& ref,
+                           const std::optional<SolidCounts>& solid) {
   const auto file = files.create(partial);
   const std::vector<std::byte> header = encode_segment_header(0);
   file->write_at(0, header);
@@ -88,11 +90,15 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
   }
   std::vector<std::byte> footer;
   ByteSink sink(footer);
-  sink.put(kEntryMagic);
+  sink.put(solid ? kSolidEntryMagic : kEntryMagic);
   sink.put(begin);
   sink.put(ref.bytes);
   sink.put(uint64_t{ref.index_offset - ref.offset + begin});
   sink.put(ref.checksum);
+  if (solid) {
+    sink.put(solid->interior);
+    sink.put(solid->disputed);
+  }
   sink.put(footer_checksum(footer, key));
   file->write_at(end, footer);
   file->close();
@@ -100,29 +106,35 @@ uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std
   return end + footer.size();
 }
 
-CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key) {
+CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key,
+                            bool is_solid) {
+  const size_t footer_bytes = is_solid ? kSolidFooterBytes : kFooterBytes;
   CacheEntry entry;
   entry.file = files.open_own(path);
-  if (entry.file->size() < kSegmentHeaderBytes + kFooterBytes)
+  if (entry.file->size() < kSegmentHeaderBytes + footer_bytes)
     corrupt_copy(path, "it has " + std::to_string(entry.file->size()) +
                            " bytes: expected at least " +
-                           std::to_string(kSegmentHeaderBytes + kFooterBytes));
+                           std::to_string(kSegmentHeaderBytes + footer_bytes));
   std::byte header[kSegmentHeaderBytes];
   entry.file->read_at(0, header);
   check_segment_header(header, 0, path);
-  std::byte footer[kFooterBytes];
-  entry.file->read_at(entry.file->size() - kFooterBytes, footer);
+  std::vector<std::byte> footer(footer_bytes);
+  entry.file->read_at(entry.file->size() - footer_bytes, footer);
   ByteSource source(footer);
-  if (source.get<uint64_t>() != kEntryMagic)
+  if (source.get<uint64_t>() != (is_solid ? kSolidEntryMagic : kEntryMagic))
     corrupt_copy(
         path,
-        "its last " + std::to_string(kFooterBytes) +
+        "its last " + std::to_string(footer_bytes) +
             " bytes do not begin with the signature of a footer: expected a complete cache entry");
   entry.ref.offset = source.get<uint64_t>();
   entry.ref.bytes = source.get<uint64_t>();
   entry.ref.index_offset = source.get<uint64_t>();
   entry.ref.checksum = source.get<uint64_t>();
-  if (source.get<uint64_t>() != footer_checksum(std::span(footer).first(kFooterBytes - 8), key))
+  if (is_solid) {
+    entry.solid.interior = source.get<uint64_t>();
+    entry.solid.disputed = source.get<uint64_t>();
+  }
+  if (source.get<uint64_t>() != footer_checksum(std::span(footer).first(footer_bytes - 8), key))
     corrupt_copy(path, "its footer fails its checksum, or belongs to another key than " + key);
   const ArtifactIndex index = read_single_index(*entry.file, entry.ref);
   entry.root = index.roots[0];

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/format/artifact/segment_writer.h"
@@ -17,24 +18,31 @@ namespace voxdag {
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);
 
+// The counts of a subvolume of a solid that its artifact does not have (SubDagSummary).
+struct SolidCounts {
+  uint64_t interior = 0, disputed = 0;
+};
+
 // Writes the artifact at `ref` of `from` as the cache entry of `key` at `path`, atomically: writes
-// the file `partial`, a name that only the caller uses, and renames it to `path`. Does not sync the
-// file. If a power failure damages an entry, its checksums fail, and a lookup of the entry is a
-// cache miss. Returns the size of the file in bytes.
+// the file `partial`, a name that only the caller uses, and renames it to `path`. `solid` is set
+// for a subvolume of a solid. Does not sync the file. If a power failure damages an entry, its
+// checksums fail, and a lookup of the entry is a cache miss. Returns the size of the file in bytes.
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,
-                           const std::string& key, const ReadableFile& from,
-                           const ArtifactRef& ref);
+                           const std::string& key, const ReadableFile& from, const ArtifactRef& ref,
+                           const std::optional<SolidCounts>& solid = std::nullopt);
 
 struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
   ArtifactRef ref;
   ArtifactRoot root;       // the artifact's root, with the cube of the original build
   uint64_t dag_nodes = 0;  // total of all levels
+  SolidCounts solid;       // 0 in the entry of a shell
 };
 
 // Opens the cache entry of `key` and reads its artifact's index. Throws Error{kNotFound} if the
 // file does not exist. Throws Error{kCorrupt} or Error{kUnsupportedVersion} if the file is invalid,
-// or if it is the entry of another key.
-CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key);
+// or if it is the entry of another key. `is_solid`: the entry must be of a subvolume of a solid.
+CacheEntry read_cache_entry(FileSystem& files, const std::string& path, const std::string& key,
+                            bool is_solid = false);
 
 }  // namespace voxdag

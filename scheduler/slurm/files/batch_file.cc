@@ -12,11 +12,19 @@
 namespace voxdag {
 
 template <class Visitor>
+void fields(Visitor& visit, RowExtent& extent) {
+  visit("bytes", extent.bytes);
+  visit("checksum", extent.checksum);
+}
+
+template <class Visitor>
 void fields(Visitor& visit, BatchSubvolume& subvolume) {
   visit("id", subvolume.id);
   fields(visit, subvolume.cube);
   visit("weight", subvolume.weight);
   visit("triangles", subvolume.triangles);
+  visit(Field("unit").omit_empty(), subvolume.unit);
+  visit(Field("views").omit_empty(), subvolume.views);
 }
 
 template <class Visitor>
@@ -27,6 +35,7 @@ void fields(Visitor& visit, Batch& batch) {
   visit("grid_levels", batch.shape.grid_levels);
   visit("hash_bits", batch.shape.hash_bits);
   visit("rule", batch.rule);
+  visit(Field("solid").omit_empty(), batch.solid);
   visit("wide", batch.wide);
   visit("backend", batch.backend);
   visit("method", batch.method);
@@ -36,7 +45,7 @@ void fields(Visitor& visit, Batch& batch) {
 
 namespace {
 
-constexpr std::string_view kBatchMagic = "vdbatch2";
+constexpr std::string_view kBatchMagic = "vdbatch3";
 constexpr uint64_t kMaxHeaderBytes = uint64_t{256} << 20;
 
 struct Prologue {
@@ -109,7 +118,7 @@ double Batch::weight() const {
 
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
-                 const CancelToken& cancel) {
+                 const RowFile* rows, const CancelToken& cancel) {
   const std::string header = record_json(batch).dump();
   const auto header_bytes = std::as_bytes(std::span(header));
   Prologue prologue{{}, header.size(), checksum64(header_bytes)};
@@ -119,9 +128,11 @@ void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
   BlockWriter out(*file);
   out.add(bytes_of(prologue));
   out.add(header_bytes);
-  for (size_t i = 0; i < batch.subvolumes.size(); ++i)
-    write_triangles(*open(i), batch.subvolumes[i].triangles, triangle_record_bytes(batch.wide),
-                    cancel, out);
+  for (size_t i = 0; i < batch.subvolumes.size(); ++i) {
+    const BatchSubvolume& subvolume = batch.subvolumes[i];
+    write_triangles(*open(i), subvolume.triangles, triangle_record_bytes(batch.wide), cancel, out);
+    for (const RowExtent& views : subvolume.views) out.add(rows->read(views));
+  }
   out.flush();
   file->sync();
   file->close();
@@ -158,34 +169,63 @@ BatchFile::BatchFile(FileSystem& files, const std::string& path) : file_(files.o
   data_begin_ = sizeof prologue + header.size();
 }
 
-std::vector<BinId> BatchFile::copy_to(TriangleStore& store, const CancelToken& cancel) const {
+std::vector<BinId> BatchFile::copy_to(TriangleStore& store, SolidRows* rows,
+                                      const CancelToken& cancel) const {
   std::vector<Cube> cubes;
   for (const BatchSubvolume& subvolume : batch_.subvolumes) cubes.push_back(subvolume.cube);
   store.add_cube_bins(cubes);
   std::vector<BinId> bins;
-  const size_t record_bytes = triangle_record_bytes(batch_.wide);
-  std::vector<std::byte> chunk;
   uint64_t offset = data_begin_;
   for (size_t i = 0; i < batch_.subvolumes.size(); ++i) {
+    const BatchSubvolume& subvolume = batch_.subvolumes[i];
     bins.push_back(store.cube_bins()[i].bin);
-    for (uint64_t left = batch_.subvolumes[i].triangles; left > 0;) {
-      cancel.check();
-      const uint64_t n = std::min(left, kBatchChunkRecords);
-      chunk.resize(sizeof(uint64_t) + n * record_bytes);
-      file_->read_at(offset, chunk);
-      const auto records = std::span<const std::byte>(chunk).subspan(sizeof(uint64_t));
-      uint64_t checksum = 0;
-      std::memcpy(&checksum, chunk.data(), sizeof checksum);
-      if (checksum64(records) != checksum)
-        throw Error(ErrorCode::kCorrupt,
-                    file_->path() + " at offset " + std::to_string(offset) +
-                        ": triangles fail their checksum: expected what was written there");
-      add_records(store, bins.back(), records);
-      offset += chunk.size();
-      left -= n;
-    }
+    offset = copy_triangles(offset, subvolume.triangles, store, bins.back(), cancel);
+    if (rows != nullptr)
+      offset = copy_rows(offset, subvolume, *rows);
+    else
+      for (const RowExtent& views : subvolume.views) offset += views.bytes;
   }
   return bins;
+}
+
+uint64_t BatchFile::copy_triangles(uint64_t offset, uint64_t count, TriangleStore& store, BinId bin,
+                                   const CancelToken& cancel) const {
+  const size_t record_bytes = triangle_record_bytes(batch_.wide);
+  std::vector<std::byte> chunk;
+  for (uint64_t left = count; left > 0;) {
+    cancel.check();
+    const uint64_t n = std::min(left, kBatchChunkRecords);
+    chunk.resize(sizeof(uint64_t) + n * record_bytes);
+    file_->read_at(offset, chunk);
+    const auto records = std::span<const std::byte>(chunk).subspan(sizeof(uint64_t));
+    uint64_t checksum = 0;
+    std::memcpy(&checksum, chunk.data(), sizeof checksum);
+    if (checksum64(records) != checksum)
+      throw Error(ErrorCode::kCorrupt,
+                  file_->path() + " at offset " + std::to_string(offset) +
+                      ": triangles fail their checksum: expected what was written there");
+    add_records(store, bin, records);
+    offset += chunk.size();
+    left -= n;
+  }
+  return offset;
+}
+
+uint64_t BatchFile::copy_rows(uint64_t offset, const BatchSubvolume& subvolume,
+                              SolidRows& rows) const {
+  SubvolumeRows added{subvolume.unit, {}};
+  if (subvolume.views.size() != std::size(added.views))
+    throw Error(ErrorCode::kCorrupt, file_->path() + ": a subvolume has views along " +
+                                         std::to_string(subvolume.views.size()) +
+                                         " axes: expected 3");
+  for (size_t a = 0; a < subvolume.views.size(); ++a) {
+    RowExtent extent = subvolume.views[a];
+    extent.offset = offset;
+    added.views[a] = rows.file().append(read_extent(*file_, extent));
+    offset += extent.bytes;
+  }
+  rows.add(subvolume.cube, added);
+  return offset;
 }
 
 }  // namespace voxdag

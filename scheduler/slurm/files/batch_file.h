@@ -1,10 +1,12 @@
 // The input of a cluster task: its subvolumes and their triangles, in one write-once file.
 //
-//   "vdbatch2"  u64 size of the header in bytes  u64 XXH64 of the header  header (JSON)
-//   chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
+//   "vdbatch3"  u64 size of the header in bytes  u64 XXH64 of the header  header (JSON)
+//   for each subvolume, in order:
+//     chunks of records: u64 XXH64 of the records  up to kBatchChunkRecords records (chunk.h)
+//     solids only: compressed views along x, y and z (solid_rows.h)
 //
-// Chunks are contiguous, in the order of the subvolumes. All chunks of a subvolume but the last
-// are full.
+// All chunks of a subvolume but the last are full. The header has the sizes and checksums of the
+// views.
 #pragma once
 
 #include <cstdint>
@@ -19,6 +21,7 @@
 #include "core/geometry/cube.h"
 #include "core/geometry/voxel_rule.h"
 #include "core/io/file_system.h"
+#include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/triangles/memory_store.h"
@@ -33,6 +36,10 @@ struct BatchSubvolume {
   Cube cube;
   double weight = 0;
   uint64_t triangles = 0;
+  // Solids only: the state of the subvolume, and the extents of its views along x, y and z in the
+  // file of the rows (SolidRows::file()). The batch file stores no offsets.
+  SolidUnit unit = SolidUnit::kShell;
+  std::vector<RowExtent> views;
 };
 
 struct Batch {
@@ -41,6 +48,7 @@ struct Batch {
   std::string build;    // random id of the build
   DagShape shape;
   VoxelRule rule = VoxelRule::kShell;
+  SolidRule solid = SolidRule::kNone;
   bool wide = false;  // records have 64 bits per coordinate
   BackendName backend = BackendName::kAuto;
   MethodName method = MethodName::kDefault;
@@ -51,10 +59,12 @@ struct Batch {
 };
 
 // Writes the file. When this returns, the file is durable under its name. open(i) returns the
-// triangles of batch.subvolumes[i]. Throws DamagedTriangles if there are fewer than expected.
+// triangles of batch.subvolumes[i]. `rows`: the file of the solid's rows; null for a shell. Throws
+// DamagedTriangles if there are fewer triangles than expected, and Error{kCorrupt} for damaged
+// rows.
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
-                 const CancelToken& cancel);
+                 const RowFile* rows, const CancelToken& cancel);
 
 class BatchFile {
  public:
@@ -62,11 +72,18 @@ class BatchFile {
   BatchFile(FileSystem& files, const std::string& path);
 
   const Batch& batch() const { return batch_; }
-  // Adds the triangles to a store and returns the bin of each subvolume. Throws Error{kCorrupt} if
-  // records do not match their checksum.
-  std::vector<BinId> copy_to(TriangleStore& store, const CancelToken& cancel) const;
+  // Adds the triangles to a store and returns the bin of each subvolume. If `rows` is not null,
+  // also adds the rows of each subvolume to `rows`. Throws Error{kCorrupt} if records or rows do
+  // not match their checksum.
+  std::vector<BinId> copy_to(TriangleStore& store, SolidRows* rows,
+                             const CancelToken& cancel) const;
 
  private:
+  // Both functions return the offset of the byte after the data that they read.
+  uint64_t copy_triangles(uint64_t offset, uint64_t count, TriangleStore& store, BinId bin,
+                          const CancelToken& cancel) const;
+  uint64_t copy_rows(uint64_t offset, const BatchSubvolume& subvolume, SolidRows& rows) const;
+
   std::unique_ptr<ReadableFile> file_;
   Batch batch_;
   uint64_t data_begin_ = 0;

@@ -6,6 +6,7 @@
 #include "core/fields/json_fields.h"
 #include "core/format/artifact/artifact_fields.h"
 #include "scheduler/slurm/files/cluster_folder.h"
+#include "scheduler/solid/solid_rows.h"
 #include "scheduler/spec/report_fields.h"
 
 namespace voxdag {
@@ -51,6 +52,7 @@ void fields(Visitor& visit, ClusterState& state) {
   visit("grid_levels", state.shape.grid_levels);
   visit("hash_bits", state.shape.hash_bits);
   visit(Field("rule").omit_empty(), state.rule);  // missing in states of earlier versions
+  visit(Field("solid").omit_empty(), state.solid);
   visit("submitted_s", state.submitted_s);
   visit("next_batch", state.next_batch);
   visit("split", state.totals.split);

@@ -12,6 +12,7 @@
 
 #include "core/dag/sub_dag.h"
 #include "core/geometry/cube.h"
+#include "core/geometry/solid_rule.h"
 #include "core/geometry/voxel_rule.h"
 #include "core/io/file_system.h"
 #include "scheduler/slurm/commands/slurm.h"
@@ -57,7 +58,8 @@ struct ClusterState {
   std::string scene_digest;
   DagShape shape;
   VoxelRule rule = VoxelRule::kShell;
-  double submitted_s = 0;  // Unix time of the first submission
+  SolidRule solid = SolidRule::kNone;  // the rule by which the tasks fill a solid
+  double submitted_s = 0;              // Unix time of the first submission
   uint32_t next_batch = 0;
   std::vector<OpenBatch> open;  // sorted by number
   ClusterTotals totals;

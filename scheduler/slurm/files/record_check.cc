@@ -22,15 +22,23 @@ std::string describe(const Cube& cube) {
 // no voxel if it crosses no axis-parallel line through voxel centers.
 bool always_sets_voxels(VoxelRule rule) { return rule == VoxelRule::kShell; }
 
-// Checks that the record has voxels only in subvolumes that have triangles. Unless the rule allows
-// triangles without voxels, also checks that every subvolume with triangles has voxels.
+// True if all voxels of the subvolume's cube are set, and the build is a solid.
+bool is_full_cube(const ClusterState& state, const Cube& cube, uint64_t voxels) {
+  return state.solid != SolidRule::kNone &&
+         voxels == uint64_t{1} << 3 * (state.shape.grid_levels - cube.level);
+}
+
+// Checks that the record has voxels only in subvolumes that have triangles, and in full cubes of a
+// solid. Unless the rule allows triangles without voxels, also checks that every subvolume with
+// triangles has voxels.
 void check_counts(const CompletionRecord& record, std::span<const ExpectedSubvolume> subvolumes,
-                  VoxelRule rule) {
+                  const ClusterState& state) {
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     const auto& triangles = subvolumes[i].triangles;
     const uint64_t voxels = record.subvolumes[i].summary.voxels;
     if (!triangles || (*triangles > 0) == (voxels > 0)) continue;
-    if (*triangles == 0 || always_sets_voxels(rule))
+    if (*triangles == 0 && is_full_cube(state, subvolumes[i].cube, voxels)) continue;
+    if (*triangles == 0 || always_sets_voxels(state.rule))
       refuse_record("it has " + std::to_string(voxels) + " voxels for the " +
                     std::to_string(*triangles) + " triangles of the subvolume at " +
                     describe(subvolumes[i].cube));
@@ -81,7 +89,7 @@ CompletionRecord read_valid_record(FileSystem& files, const ClusterFolder& folde
     refuse_record("its list of " + std::to_string(record.subvolumes.size()) +
                   " subvolumes differs from the batch's list of " +
                   std::to_string(subvolumes.size()) + ": expected the same subvolumes");
-  check_counts(record, subvolumes, state.rule);
+  check_counts(record, subvolumes, state);
   std::set<Cube> to_find;
   for (size_t i = 0; i < subvolumes.size(); ++i)
     if (!record.subvolumes[i].summary.empty()) to_find.insert(subvolumes[i].cube);

@@ -102,28 +102,14 @@ class Worker {
   // replace it.
   std::vector<QueuedSubvolume> build(const QueuedSubvolume& queued) {
     cancel_.check();
-    const StoredSubvolume& subvolume = queued.subvolume;
-    if (options_.rows != nullptr) return build_solid(queued);
-    const int64_t edge = subvolume.cube.edge_voxels(options_.shape.grid_levels);
+    const Cube& cube = queued.subvolume.cube;
+    if (options_.rows != nullptr && options_.rows->find(cube).unit != SolidUnit::kShell)
+      return build_without_shell(queued);
+    const int64_t edge = cube.edge_voxels(options_.shape.grid_levels);
     if (edge > std::max(options_.longest_edge, kSmallestEdge)) return split(queued);
-    progress_.subvolume_begun(subvolume.id);
-    SubvolumeTask task{options_.shape.grid_levels, subvolume.cube, options_.shape.hash_bits};
-    task.rule = options_.rule;
-    const auto triangles = triangles_.open(queued.bin);
-    std::optional<std::string> key;
-    if (options_.cache) {
-      MemoryBudget key_share(WorkerMemory::key_bytes(share_.limit()), &share_);
-      key = ArtifactCache::key(task, *triangles, key_share);
-      StoredSubvolume copied = subvolume;
-      if (key && options_.cache->find(*key, options_.shape.grid_levels, copied, segment_)) {
-        ++counts.cached;
-        record_built(copied, queued.bin);
-        return {};
-      }
-    }
-    StoredSubvolume built = subvolume;
-    if (!build_artifact(task, *triangles, built)) return split(queued);
-    if (key && !built.summary.empty()) add_to_cache(*key, built.artifact);
+    progress_.subvolume_begun(queued.subvolume.id);
+    StoredSubvolume built = queued.subvolume;
+    if (!build_or_copy(queued, built)) return split(queued);
     record_built(built, queued.bin);
     return {};
   }
@@ -132,19 +118,12 @@ class Worker {
   ExecutorCounts counts;
 
  private:
-  // Builds a subvolume of a solid. If it has no voxel of the shell, it needs no triangles and is
-  // never split.
-  std::vector<QueuedSubvolume> build_solid(const QueuedSubvolume& queued) {
+  // Builds a subvolume of a solid that has no voxel of the shell. It needs no triangles.
+  std::vector<QueuedSubvolume> build_without_shell(const QueuedSubvolume& queued) {
     const Cube& cube = queued.subvolume.cube;
-    const SolidUnit unit = options_.rows->find(cube).unit;
-    const int64_t edge = cube.edge_voxels(options_.shape.grid_levels);
-    if (unit == SolidUnit::kShell && edge > std::max(options_.longest_edge, kSmallestEdge))
-      return split(queued);
     progress_.subvolume_begun(queued.subvolume.id);
     StoredSubvolume built = queued.subvolume;
-    if (unit == SolidUnit::kShell) {
-      if (!build_solid_artifact(*triangles_.open(queued.bin), built)) return split(queued);
-    } else if (unit == SolidUnit::kEmptyUnit) {
+    if (options_.rows->find(cube).unit == SolidUnit::kEmptyUnit) {
       const UnitViews views =
           views_of_empty(read_entry(cube).entry, cube, options_.shape.grid_levels);
       if (views.is_inside()) {
@@ -166,11 +145,27 @@ class Worker {
     return {std::move(charge), options_.rows->read_entry(cube)};
   }
 
-  bool build_solid_artifact(TriangleStream& triangles, StoredSubvolume& built) {
-    const ChargedEntry rows = read_entry(built.cube);
-    return build_artifact(
-        {options_.shape.grid_levels, built.cube, options_.shape.hash_bits, &rows.entry}, triangles,
-        built);
+  // Sets the artifact and the summary of `built`: copies them from the cache, or builds the
+  // subvolume. Returns false if the subvolume must be split.
+  bool build_or_copy(const QueuedSubvolume& queued, StoredSubvolume& built) {
+    std::optional<ChargedEntry> rows;
+    if (options_.rows != nullptr) rows.emplace(read_entry(built.cube));
+    SubvolumeTask task{options_.shape.grid_levels, built.cube, options_.shape.hash_bits};
+    task.rule = options_.rule;
+    if (rows) task.solid = &rows->entry;
+    const auto triangles = triangles_.open(queued.bin);
+    std::optional<std::string> key;
+    if (options_.cache != nullptr) {
+      MemoryBudget key_share(WorkerMemory::key_bytes(share_.limit()), &share_);
+      key = ArtifactCache::key(task, *triangles, key_share);
+    }
+    if (key && options_.cache->find(*key, task, built, segment_)) {
+      ++counts.cached;
+      return true;
+    }
+    if (!build_artifact(task, *triangles, built)) return false;
+    if (key && !built.summary.empty()) add_to_cache(*key, task, built);
+    return true;
   }
 
   // Builds the subvolume, and sets the artifact and the summary of `built`. Returns false if the
@@ -195,11 +190,12 @@ class Worker {
     progress_.subvolume_built(status);
   }
 
-  void add_to_cache(const std::string& key, const ArtifactRef& artifact) {
+  void add_to_cache(const std::string& key, const SubvolumeTask& task,
+                    const StoredSubvolume& built) {
     segment_.flush();
     if (!written_segment_)
       written_segment_ = files_.open_own(segment_path(options_.segment_folder, segment_.id()));
-    options_.cache->add(key, *written_segment_, artifact);
+    options_.cache->add(key, task, *written_segment_, built);
   }
 
   std::vector<QueuedSubvolume> split(const QueuedSubvolume& whole) {

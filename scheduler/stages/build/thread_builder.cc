@@ -1,13 +1,13 @@
 #include "scheduler/stages/build/thread_builder.h"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "scheduler/stages/build/choose_backend.h"
 #include "scheduler/stages/build/executor.h"
 #include "scheduler/stages/partition/partition_stage.h"
+#include "scheduler/stages/rows/prepare_rows.h"
 
 namespace voxdag {
 namespace {
@@ -24,26 +24,12 @@ ExecutorOptions executor_options(BuildJob& job, const BackendChoice& backend) {
   options.first_segment_id = job.work.next_segment_id();
   options.checkpoint_interval_s = run.checkpoint_interval_s;
   options.rows = job.rows.get();
-  if (job.cache && !job.rows) options.cache = &*job.cache;
+  if (job.cache) options.cache = &*job.cache;
   options.built = job.report.subvolumes_reused;
   return options;
 }
 
 }  // namespace
-
-void ThreadBuilder::prepare_rows(std::span<const PlannedCube> planned,
-                                 const TriangleStore& triangles) {
-  if (planned.size() != job_.store->leaves().size()) job_.has_rows();  // throws
-  std::optional<OutsideRows> outside;
-  if (job_.spec.geometry.bounds) {
-    outside.emplace(job_.report.grid.levels, job_.budget);
-    outside->read(job_.scene.open(), job_.report.grid, job_.stage());
-    job_.scene.close();
-  }
-  compute_rows(*job_.rows, planned, triangles, outside ? &*outside : nullptr,
-               job_.work.row_sums_path(), job_.stage());
-  job_.clock.finish("rows");
-}
 
 void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
   std::vector<Cube> cubes;
@@ -54,11 +40,7 @@ void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume>
   const MemoryCharge lists(job_.budget, queue.size() * (sizeof queue[0] + sizeof planned[0]),
                            "lists of subvolumes");
   job_.clock.finish("partition");
-  if (job_.rows && !job_.rows->is_ready()) {
-    std::vector<PlannedCube> bins_of_cubes;
-    for (size_t i = 0; i < planned.size(); ++i) bins_of_cubes.push_back({planned[i].cube, bins[i]});
-    prepare_rows(bins_of_cubes, *scene.triangles);
-  }
+  prepare_rows(job_, planned, bins, *scene.triangles);
   Progress& progress = job_.context.progress;
   RunOptions run = job_.spec.run;
   if (job_.rows) run.backend = BackendName::kCpu;  // the only backend that fills solids

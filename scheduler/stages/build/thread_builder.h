@@ -5,7 +5,6 @@
 #include <string>
 
 #include "scheduler/stages/build/subvolume_builder.h"
-#include "scheduler/stages/rows/rows_stage.h"
 #include "scheduler/state/job/build_job.h"
 
 namespace voxdag {
@@ -19,9 +18,6 @@ class ThreadBuilder : public SubvolumeBuilder {
   void add_to(BuildReport&) const override {}
 
  private:
-  // Computes the rows of a solid before its first subvolume is built.
-  void prepare_rows(std::span<const PlannedCube> planned, const TriangleStore& triangles);
-
   BuildJob& job_;
 };
 

@@ -271,7 +271,7 @@ TEST_F(Cluster, ADamagedBatchIsCutAgain) {
   hasty.run.cluster->max_retries = 1;
   slurm_.before_task = [&](uint32_t batch) {
     if (batch == 0)
-      std::ofstream(output() + ".work/cluster/batch-0.vdbatch") << "vdbatch2 and no more";
+      std::ofstream(output() + ".work/cluster/batch-0.vdbatch") << "vdbatch3 and no more";
   };
   const Error error = error_of([&] { run_build(hasty, context()); });
   EXPECT_NE(error.message().find("batch-0.vdbatch"), std::string::npos) << error.message();

@@ -1,5 +1,5 @@
-// Builds of solids on a cluster. An enclosed solid is filled by the merge. Solids by other rules
-// are refused, because tasks cannot fill them.
+// Builds of solids on a cluster. Tasks fill solids by winding and parity. The process that merges
+// fills an enclosed solid.
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
@@ -30,14 +30,79 @@ TEST_F(Cluster, EnclosedSolidsHaveTheSameBytes) {
   }
 }
 
-TEST_F(Cluster, SolidsByOtherRulesAreRefused) {
+void expect_same_solid(const BuildReport& report, const BuildReport& local) {
+  ASSERT_TRUE(report.solid);
+  EXPECT_GT(report.solid->interior, 0u);
+  EXPECT_EQ(report.solid->interior, local.solid->interior);
+  EXPECT_EQ(report.solid->disputed, local.solid->disputed);
+  EXPECT_EQ(report.solid->rows, local.solid->rows);
+  EXPECT_EQ(report.solid->open_rows, local.solid->open_rows);
+}
+
+TEST_F(Cluster, SolidsByRowsHaveTheSameBytes) {
   for (const SolidName rule : {SolidName::kWinding, SolidName::kParity}) {
-    const Error error = error_of([&] { run_build(with_rule(spec(2), rule), context()); });
-    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
-    for (const char* part : {"solid", name_of(rule), "cluster", "enclosed"})
-      EXPECT_NE(error.message().find(part), std::string::npos) << error.message();
+    SCOPED_TRACE(name_of(rule));
+    const BuildReport local = run_build(with_rule(local_spec(), rule), context());
+    expected_ = local.sha256;
+    slurm_.fates = {"", "TIMEOUT"};  // a batch is split
+    const BuildReport report = build(with_rule(spec(3), rule));
+    EXPECT_EQ(report.cluster->batches, 4u);
+    expect_same_solid(report, local);
   }
-  EXPECT_TRUE(slurm_.commands.empty());
+}
+
+// The only subvolume is split after a timeout, and then by its tasks. Octants without triangles are
+// empty or full. With --bounds, triangles outside the grid also count.
+TEST_F(Cluster, ASplitSubvolumeOfASolidHasTheSameBytes) {
+  const Grid whole = run_build(local_spec(), context()).grid;
+  const auto bounded = [&](BuildSpec cut) {
+    cut.geometry.bounds = {0, 0, 0, whole.edge / 2};
+    for (size_t a = 0; a < 3; ++a) (*cut.geometry.bounds)[a] = whole.origin[a] + 0.3 * whole.edge;
+    return with_rule(cut, SolidName::kWinding);
+  };
+  const BuildReport local = run_build(bounded(local_spec()), context());
+  expected_ = local.sha256;
+  BuildSpec one = bounded(spec(1));
+  one.run.subvolume_edge = 4096;  // one subvolume: the complete grid
+  slurm_.fates = {"TIMEOUT"};
+  expect_same_solid(build(one), local);
+}
+
+// The next run of a failed build reads the saved rows. A build on this machine can also continue
+// it.
+TEST_F(Cluster, AFailedBuildOfASolidGoesOn) {
+  const BuildReport local = run_build(with_rule(local_spec(), SolidName::kWinding), context());
+  expected_ = local.sha256;
+  for (const bool is_local : {false, true}) {
+    SCOPED_TRACE(is_local);
+    BuildSpec three = with_rule(spec(3), SolidName::kWinding);
+    three.run.cluster->max_retries = 0;
+    slurm_.fates = {"", "FAILED", ""};
+    EXPECT_EQ(error_of([&] { run_build(three, context()); }).code(), ErrorCode::kLimit);
+    if (is_local) three.run.cluster.reset();
+    const BuildReport report = build(three);
+    EXPECT_GT(report.subvolumes_reused, 0u);
+    expect_same_solid(report, local);
+  }
+}
+
+// The process that submits a merge job does not report the solid, because its subvolumes are not
+// built yet.
+TEST_F(Cluster, TheMergeJobReportsTheSolid) {
+  const BuildReport local = run_build(with_rule(local_spec(), SolidName::kWinding), context());
+  expected_ = local.sha256;
+  CancelToken never;
+  Warnings log;
+  BuildSpec merging = with_rule(spec(2), SolidName::kWinding);
+  slurm_.merge_job = [&] {
+    BuildSpec job = merging;
+    job.run.cluster->merge_job.reset();
+    job.run.cluster->is_merge_job = true;
+    run_build(job, {system_files(), log, never});
+  };
+  merging.run.cluster->merge_job = {.arguments = {"build"}, .folder = "/", .submit_options = {}};
+  expect_same_solid(build(merging), local);
+  EXPECT_EQ(warnings_.text.find("solid"), std::string::npos) << warnings_.text;
 }
 
 }  // namespace

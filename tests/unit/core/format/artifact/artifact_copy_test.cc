@@ -65,6 +65,23 @@ TEST_F(ArtifactCopyTest, EntriesOfOtherKeysAreRefused) {
             ErrorCode::kCorrupt);
 }
 
+// The entry of a solid also has the counts of its interior. An entry of a shell is not read as one
+// of a solid.
+TEST_F(ArtifactCopyTest, EntriesOfSolidsHaveTheirCounts) {
+  const CacheEntry shell = read_cache_entry(system_files(), entry_path_, kKey);
+  EXPECT_EQ(error_of([&] { read_cache_entry(system_files(), entry_path_, kKey, true); }).code(),
+            ErrorCode::kCorrupt);
+  const std::string path = folder_.file("solid.vdart");
+  write_cache_entry(system_files(), path, path + ".partial", kKey, *shell.file, shell.ref,
+                    SolidCounts{7, 3});
+  const CacheEntry solid = read_cache_entry(system_files(), path, kKey, true);
+  EXPECT_EQ(solid.solid.interior, 7u);
+  EXPECT_EQ(solid.solid.disputed, 3u);
+  EXPECT_EQ(solid.root.voxels, dag_.voxels);
+  EXPECT_EQ(error_of([&] { read_cache_entry(system_files(), path, kKey); }).code(),
+            ErrorCode::kCorrupt);
+}
+
 // Cache entries are not synced, so after a power cut they may contain anything. Reading an entry
 // with one flipped bit, or a truncated entry, throws Error.
 TEST_F(ArtifactCopyTest, EveryBitFlipAndTruncationIsCaught) {
