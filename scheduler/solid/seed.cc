@@ -14,7 +14,7 @@ std::string point_text(const std::array<double, 3>& point) {
 
 std::optional<Seed> seed_of(const GeometryOptions& options, const Grid& grid) {
   if (!options.seed) return std::nullopt;
-  Seed seed{{}, point_text(*options.seed)};
+  Seed seed{{}, point_text(*options.seed), options.radius};
   std::array<double, 3> snapped = *options.seed;
   snap_vertices(grid, snapped);
   const auto end = static_cast<double>(grid.resolution() * kUnitsPerVoxel);
@@ -42,7 +42,20 @@ std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cu
   return out;
 }
 
+CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels) {
+  CubeVoxel start = seed.voxel;
+  for (uint32_t& coordinate : start) coordinate += (uint32_t{1} << grid_levels) - radius / 2;
+  return start;
+}
+
 void refuse_seed_in_shell(const Seed& seed) {
+  if (seed.radius > 0)
+    throw Error(ErrorCode::kInvalidInput,
+                "--seed " + seed.text + ": the surface touches the cube of " +
+                    std::to_string(seed.radius + 1) +
+                    " voxels per edge around this point, which --radius " +
+                    std::to_string(seed.radius) +
+                    " needs: expected a point farther from surfaces, or a smaller radius");
   throw Error(ErrorCode::kInvalidInput,
               "--seed " + seed.text +
                   ": the surface touches the voxel of this point: expected a "

@@ -14,8 +14,9 @@
 namespace voxdag {
 
 struct Seed {
-  CubeVoxel voxel{};  // in the grid
-  std::string text;   // the point as "X,Y,Z"
+  CubeVoxel voxel{};    // in the grid
+  std::string text;     // the point as "X,Y,Z"
+  uint32_t radius = 0;  // GeometryOptions::radius
 };
 
 // Returns the seed of a build, or nullopt if it has none. Throws Error{kInvalidInput} if the point
@@ -26,7 +27,14 @@ std::optional<Seed> seed_of(const GeometryOptions& options, const Grid& grid);
 std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cube,
                                  uint32_t grid_levels);
 
-// Throws Error{kInvalidInput}: the seed's voxel is in the shell.
+// Returns the position at which the walking cube of a build with a radius V starts: its voxel with
+// index V / 2 along each axis, rounded down, is the seed's voxel. The position is in the grid of
+// the positions (stages/enclose/cube_walks.h). `grid_levels` are the levels of the grid of the
+// voxels.
+CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels);
+
+// Throws Error{kInvalidInput}: the seed's voxel, or a voxel of the cube that starts there, is in
+// the shell.
 [[noreturn]] void refuse_seed_in_shell(const Seed& seed);
 
 }  // namespace voxdag

@@ -58,8 +58,7 @@ void fields(Visitor& visit, GeometryOptions& g) {
             .with(&Field::parts, "X,Y,Z"),
         g.seed);
   visit(option("radius", "with solid enclosed: seal gaps of up to this many voxels")
-            .range(0, kMaxRadius)
-            .excludes("seed"),
+            .range(0, kMaxRadius),
         g.radius);
   visit(option("skip_invalid", "drop and count invalid triangles").key(true), g.skip_invalid);
   visit(option("thin", "set fewer voxels: the thinnest surface without holes between faces"),

@@ -1,4 +1,6 @@
 // Builds enclosed solids with a radius: gaps of up to this many voxels are sealed.
+#include <array>
+
 #include "core/base/error.h"
 #include "tests/oracle/solid/solids.h"
 #include "tests/oracle/solid/walks.h"
@@ -101,9 +103,55 @@ TEST_F(Radius, Refused) {
   EXPECT_NE(refusal_of(8, 8).find("less than the resolution, 8, not 8"), std::string::npos);
   EXPECT_NE(refusal_of(uint64_t{1} << 20, 1).find("at most 524288"), std::string::npos);
   EXPECT_NE(refusal_of(64, 1, SolidName::kWinding).find("to be enclosed"), std::string::npos);
-  BuildSpec spec = sealed(oracle::make_solid(oracle::SolidKind::kBox, 1, 8), 8, 1);
-  spec.geometry.seed = {4, 4, 4};
-  EXPECT_NE(voxdag::error_of([&] { run(spec); }).message().find("no seed"), std::string::npos);
+}
+
+// With a seed, the cube starts around the seed. The solid has the voxels that only this walk, or no
+// walk, covers.
+TEST_F(Radius, SeedsEqualTheOracle) {
+  int enclosed = 0, reached = 0, refused = 0;
+  for (const auto kind : {oracle::SolidKind::kNested, oracle::SolidKind::kHoles,
+                          oracle::SolidKind::kOpenBox, oracle::SolidKind::kTetrahedra})
+    for (const auto& [edge, radius] : {std::pair(16, 1), {16, 2}, {32, 3}})
+      for (int i = 0; i < 3; ++i) {
+        const std::array<int, 3> seed{edge / 2 - i * edge / 6, edge / 2, edge / 2 - i};
+        SCOPED_TRACE(testing::Message() << oracle::kind_name(kind) << ", R " << edge << ", radius "
+                                        << radius << ", seed " << i);
+        const Triangles scene = oracle::make_solid(kind, 5, edge);
+        const oracle::Voxels shell = oracle::voxelize(scene, {{0, 0, 0}, edge});
+        const auto truth = oracle::enclose_seed(shell, radius, seed);
+        BuildSpec spec = sealed(scene, edge, radius);
+        spec.geometry.seed = {seed[0] + 0.5, seed[1] + 0.5, seed[2] + 0.5};
+        if (!truth) {
+          ++refused;
+          const voxdag::Error error = voxdag::error_of([&] { run(spec); });
+          EXPECT_EQ(error.code(), voxdag::ErrorCode::kInvalidInput);
+          EXPECT_NE(error.message().find("farther from surfaces"), std::string::npos);
+          continue;
+        }
+        const BuildReport report = run(spec);
+        expect_file_equals(report.output, truth->voxels, 64);
+        EXPECT_EQ(report.solid->interior, truth->voxels.count() - shell.count());
+        EXPECT_EQ(report.warnings.empty(), truth->is_enclosed);
+        ++(truth->is_enclosed ? enclosed : reached);
+      }
+  EXPECT_GE(enclosed, 3);
+  EXPECT_GT(reached, 3);
+  EXPECT_GT(refused, 0);
+}
+
+// The subvolumes, the threads and the memory do not change the bytes of a solid with a seed.
+TEST_F(Radius, RunOptionsNeverShowWithASeed) {
+  BuildSpec spec = sealed(oracle::make_solid(oracle::SolidKind::kNested, 6, 128), 128, 3);
+  spec.geometry.seed = {64, 64, 64};
+  spec.run.subvolume_edge = 128;
+  const BuildReport whole = run(spec);
+  EXPECT_GT(whole.solid->interior, 0u);
+  spec.run.subvolume_edge = 64;
+  spec.run.threads = 2;
+  spec.run.memory_bytes = 64 * kMebibyte;
+  EXPECT_EQ(run(spec).sha256, whole.sha256);
+  spec.geometry.radius = 0;
+  EXPECT_NE(run(spec).sha256, whole.sha256);
 }
 
 }  // namespace

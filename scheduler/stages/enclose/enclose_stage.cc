@@ -45,6 +45,15 @@ struct LabeledSpace {
   std::optional<SpaceLabels> labels;
 };
 
+// Returns the seed of the build, if any, in the grid with this shape: the grid of the voxels, or
+// the grid of the positions (cube_walks.h).
+std::optional<Seed> start_of_walks(const BuildJob& job, const DagShape& shape) {
+  std::optional<Seed> seed = seed_of(job.spec.geometry, job.report.grid);
+  if (seed && shape != job.shape())
+    seed->voxel = start_position(*seed, seed->radius, job.shape().grid_levels);
+  return seed;
+}
+
 class Enclosure {
  public:
   // Fills the empty space that `walls` enclose. `shape` is the shape of the grid that has the
@@ -56,7 +65,7 @@ class Enclosure {
         walls_(walls),
         shape_(shape),
         result_(result),
-        seed_(seed_of(job.spec.geometry, job.report.grid)) {}
+        seed_(start_of_walks(job, shape)) {}
 
   void run() {
     job_.context.progress.begin_stage("enclose", 2 * walls_.size(), "subvolumes");
@@ -233,7 +242,7 @@ class Enclosure {
     }
     for (const auto& worker : workers_)
       all.insert(all.end(), worker->done.begin(), worker->done.end());
-    if (&result_ == job_.filled.get()) warn_of_walks(job_, all, outside.is_seed_outside);
+    if (seed_ || &result_ == job_.filled.get()) warn_of_walks(job_, all, outside.is_seed_outside);
     complete_pass(result_, std::move(all), workers_);
   }
 

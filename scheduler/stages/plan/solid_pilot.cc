@@ -92,8 +92,8 @@ NodeLevels take_levels(PooledMemory& memory, SubDagTables& tables) {
 
 // Returns the closed positions of a walking cube (core/dag/space/cube_walk.h). They are in a grid
 // of twice the resolution, whose octant with the largest coordinates is the grid of the voxels.
-NodeLevels closed_positions(PooledMemory& memory, const NodeLevels& shell, uint32_t radius,
-                            uint32_t levels) {
+NodeLevels closed_positions(PooledMemory& memory, const NodeLevels& shell,
+                            const std::optional<Seed>& seed, uint32_t radius, uint32_t levels) {
   const int size_log2 = static_cast<int>(levels);
   SubDagTables blocked_tables(memory, size_log2 + 1);
   NodeRef octants[8];
@@ -106,13 +106,18 @@ NodeLevels closed_positions(PooledMemory& memory, const NodeLevels& shell, uint3
   const NodeLevels blocked = take_levels(memory, blocked_tables);
   SpaceLabels labels(memory, blocked);
   SubDagTables closed(memory, size_log2 + 1);
-  fill_enclosed(memory, labels, std::vector<uint8_t>(labels.count(0, 0), 1), closed);
+  const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);
+  if (seed)
+    fill_from_seed(memory, labels, is_outside, start_position(*seed, radius, levels), closed);
+  else
+    fill_enclosed(memory, labels, is_outside, closed);
   return take_levels(memory, closed);
 }
 
-SubDagSummary fill_sealed(PooledMemory& memory, const NodeLevels& shell, uint32_t radius,
-                          uint32_t levels, SubDagSink& sink) {
-  const NodeLevels closed = closed_positions(memory, shell, radius, levels);
+SubDagSummary fill_sealed(PooledMemory& memory, const NodeLevels& shell,
+                          const std::optional<Seed>& seed, uint32_t radius, uint32_t levels,
+                          SubDagSink& sink) {
+  const NodeLevels closed = closed_positions(memory, shell, seed, radius, levels);
   CubeNeighbors around;
   for (int n = 0; n < 8; ++n)
     if (closed.has_child(0, 0, 7 - n))
@@ -127,7 +132,7 @@ SubDagSummary fill_sealed(PooledMemory& memory, const NodeLevels& shell, uint32_
 SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell,
                          const std::optional<Seed>& seed, uint32_t radius, uint32_t levels,
                          SubDagSink& sink) {
-  if (radius > 0) return fill_sealed(memory, shell, radius, levels, sink);
+  if (radius > 0) return fill_sealed(memory, shell, seed, radius, levels, sink);
   SpaceLabels labels(memory, shell);
   // The faces of the cube are the border of the grid, so all labeled components are outside.
   const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);

@@ -55,12 +55,30 @@ TEST_F(RadiusOption, VerifyFindsAnotherRadius) {
   EXPECT_TRUE(is_found);
 }
 
+// With a seed, the cube starts around this point, so it must be empty there.
+TEST_F(RadiusOption, StartsAtTheSeed) {
+  const auto seeded = [&](const char* radius, const char* seed) {
+    auto arguments = build(radius);
+    arguments.insert(arguments.end(), {"--seed", seed});
+    return arguments;
+  };
+  const Json sealed = run_json(seeded("2", "16,16,16"));
+  EXPECT_GE(sealed["solid"]["interior"], 22 * 22 * 22);
+  EXPECT_EQ(sealed["solid"]["radius"], 2);
+  EXPECT_EQ(sealed["solid"]["seed"][2], 16);
+  EXPECT_EQ(run_json({"verify", "b.vdag", "--against", "box.obj", "--solid", "enclosed", "--radius",
+                      "2"})["ok"],
+            true);
+  const Json plan = run_json({"plan", "box.obj", "-r", "32", "--bounds", "0,0,0,32", "--solid",
+                              "enclosed", "--radius", "2", "--seed", "16,16,16"});
+  EXPECT_EQ(plan["solid"]["interior"]["likely"], sealed["solid"]["interior"]);
+  EXPECT_EQ(run_json(seeded("1", "16,16,16"))["warnings"][0]["code"], "solid-reached");
+  expect_error(2, "farther from surfaces", seeded("2", "8,16,26.5"));
+}
+
 TEST_F(RadiusOption, RefusedValues) {
   expect_error(2, "16", build("17"));
   expect_error(2, "radius", {"build", "box.obj", "-r", "32", "-o", "b.vdag", "--radius", "1"});
-  auto seeded = build("1");
-  seeded.insert(seeded.end(), {"--seed", "16,16,16"});
-  expect_error(2, "seed", seeded);
   run_json(build("2"));
   expect_error(
       2, "16",

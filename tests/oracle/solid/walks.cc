@@ -20,35 +20,74 @@ void for_each_voxel(const Place& cube, int radius, int edge, Visit visit) {
         if (in_grid(z)) visit(x, y, z);
 }
 
-}  // namespace
+// The positions of a cube of radius + 1 voxels per edge: all that touch the grid, and those around
+// them. The cube is given by its voxel with the lowest coordinates.
+struct Walks {
+  const Voxels& shell;
+  int radius;
+  int edge = shell.edge(), first = -radius - 1, end = edge + 1;
 
-Voxels enclose(const Voxels& shell, int radius) {
-  const int edge = shell.edge(), first = -radius - 1, end = edge + 1;
-  const auto is_free = [&](const Place& cube) {
+  bool is_free(const Place& cube) const {
     bool is_empty = true;
     for_each_voxel(cube, radius, edge,
                    [&](int x, int y, int z) { is_empty &= !shell.at(x, y, z); });
     return is_empty;
-  };
-  const Place start = {first, first, first};
-  std::vector<Place> reached = {start};
-  std::set<Place> seen = {start};
-  for (size_t i = 0; i < reached.size(); ++i)
-    for (size_t a = 0; a < 3; ++a)
-      for (const int step : {-1, 1}) {
-        Place next = reached[i];
-        next[a] += step;
-        if (next[a] < first || next[a] >= end || !seen.insert(next).second) continue;
-        if (is_free(next)) reached.push_back(next);
-      }
-  Voxels covered(edge), out(edge);
-  for (const Place& cube : reached)
-    for_each_voxel(cube, radius, edge, [&](int x, int y, int z) { covered.set(x, y, z); });
-  for (int x = 0; x < edge; ++x)
-    for (int y = 0; y < edge; ++y)
-      for (int z = 0; z < edge; ++z)
-        if (!covered.at(x, y, z)) out.set(x, y, z);
-  return out;
+  }
+  // Returns the free positions that are reached from `start`.
+  std::set<Place> reached_from(const Place& start) const {
+    std::vector<Place> reached = {start};
+    std::set<Place> seen = {start}, free = {start};
+    for (size_t i = 0; i < reached.size(); ++i)
+      for (size_t a = 0; a < 3; ++a)
+        for (const int step : {-1, 1}) {
+          Place next = reached[i];
+          next[a] += step;
+          if (next[a] < first || next[a] >= end || !seen.insert(next).second) continue;
+          if (!is_free(next)) continue;
+          reached.push_back(next);
+          free.insert(next);
+        }
+    return free;
+  }
+  // Returns the voxels that none of the positions for which is_open() is true covers.
+  template <class IsOpen>
+  Voxels uncovered(const IsOpen& is_open) const {
+    Voxels covered(edge), out(edge);
+    for (int x = first; x < end; ++x)
+      for (int y = first; y < end; ++y)
+        for (int z = first; z < end; ++z)
+          if (is_open({x, y, z}))
+            for_each_voxel({x, y, z}, radius, edge,
+                           [&](int i, int j, int k) { covered.set(i, j, k); });
+    for (int x = 0; x < edge; ++x)
+      for (int y = 0; y < edge; ++y)
+        for (int z = 0; z < edge; ++z)
+          if (!covered.at(x, y, z)) out.set(x, y, z);
+    return out;
+  }
+};
+
+}  // namespace
+
+Voxels enclose(const Voxels& shell, int radius) {
+  const Walks walks{shell, radius};
+  const std::set<Place> open = walks.reached_from({walks.first, walks.first, walks.first});
+  return walks.uncovered([&](const Place& cube) { return open.contains(cube); });
+}
+
+std::optional<SeededSolid> enclose_seed(const Voxels& shell, int radius,
+                                        const std::array<int, 3>& seed) {
+  const Walks walks{shell, radius};
+  Place start = seed;
+  for (int& coordinate : start) coordinate -= radius / 2;
+  if (!walks.is_free(start)) return std::nullopt;
+  std::set<Place> reached = walks.reached_from(start);
+  const bool is_enclosed = !reached.contains({walks.first, walks.first, walks.first});
+  if (!is_enclosed) reached.clear();
+  return SeededSolid{walks.uncovered([&](const Place& cube) {
+                       return walks.is_free(cube) && !reached.contains(cube);
+                     }),
+                     is_enclosed};
 }
 
 }  // namespace oracle
