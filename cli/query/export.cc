@@ -134,6 +134,11 @@ void declare(Command& command, ExportCommand& state) {
       .needs(chunks_option);
   command.flag("--compact", state.options.compact,
                "npz: leave out the arrays that can be computed from the others");
+  command.flag("--outside", state.options.outside,
+               "glb: write only the faces that are visible from outside, not those around enclosed "
+               "space");
+  command.flag("--watertight", state.options.watertight,
+               "glb: write a closed mesh: triangles meet at common edges and vertices");
   command.flag("--force", state.force, "replace existing files");
   command.quiet_flag(state.quiet);
   command.json_flag(state.json);

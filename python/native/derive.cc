@@ -72,6 +72,8 @@ query::ExportOptions export_options(const nlohmann::json& given) {
   if (up == "z") options.up = query::UpAxis::kZ;
   options.grid = given.value("grid", "");
   options.compact = given.value("compact", false);
+  options.outside = given.value("outside", false);
+  options.watertight = given.value("watertight", false);
   return options;
 }
 

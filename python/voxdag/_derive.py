@@ -86,6 +86,8 @@ def export(
     up: Optional[str] = None,
     grid: Optional[str] = None,
     compact: bool = False,
+    outside: bool = False,
+    watertight: bool = False,
     force: bool = False,
     progress: Progress = None,
 ) -> ExportReport:
@@ -106,6 +108,8 @@ def export(
     grid                  for vdb and nvdb: "density" (the default) or "mask"
     compact               for npz: if True, omits the positions, which can be computed from the
                           cells
+    outside               for glb: if True, writes only the faces that are visible from outside
+    watertight            for glb: if True, writes a closed mesh without T-junctions
     force                 if True, replaces existing files
     progress              as in build()
 
@@ -116,7 +120,15 @@ def export(
     to = _format_of(output) if to is None else to
     if up not in (None, "y", "z"):
         raise Error(f"up={up!r}: expected 'y' or 'z'", "invalid_input")
-    options = json.dumps({"up": up or "", "grid": grid or "", "compact": bool(compact)})
+    options = json.dumps(
+        {
+            "up": up or "",
+            "grid": grid or "",
+            "compact": bool(compact),
+            "outside": bool(outside),
+            "watertight": bool(watertight),
+        }
+    )
     files = _native.export_paths(to, output)
     _check_output(path, files, force)
     with Dag(path) as dag:

@@ -150,6 +150,8 @@ class ExportOptions(TypedDict, total=False):
     up: str | None
     grid: str | None
     compact: bool
+    outside: bool
+    watertight: bool
     force: bool
     progress: Progress
 

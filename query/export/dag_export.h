@@ -8,6 +8,7 @@
 #include "core/base/memory_budget.h"
 #include "query/dag/dag_view.h"
 #include "query/export/export.h"
+#include "query/export/outside/filled_dag.h"
 #include "query/export/turn/turned_dag.h"
 
 namespace voxdag::query {
@@ -32,7 +33,11 @@ class DagExport {
   const AxisTurn turn_;
   MemoryBudget budget_;
   const DagView dag_;
+  // Makes filled_ for a grid, unless the last call was for the same grid.
+  void fill(const DagView& dag, uint32_t grid_levels);
+
   std::optional<TurnedDag> turned_;  // made by the first write() if turn_ changes the axes
+  std::optional<FilledDag> filled_;  // of the last written grid, for --outside
 };
 
 }  // namespace voxdag::query

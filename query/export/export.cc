@@ -34,7 +34,8 @@ constexpr ExportFormat kFormats[] = {
      write_vtu},
     {"inp", "Abaqus, CalculiX: an element C3D8 for each voxel, with shared nodes", nullptr, nullptr,
      write_inp},
-    {"glb", "glTF: a mesh of the surface, for regions", nullptr, nullptr, write_glb},
+    {"glb", "glTF: a mesh of the surface, for regions", nullptr, nullptr, write_glb, UpAxis::kY,
+     " outside watertight"},
 };
 
 // Returns the turn of the DAG (axis_turn.h) that makes the file's y axis point along `up`. Without
@@ -64,7 +65,9 @@ const ExportFormat& export_format(const std::string& name) {
 
 void check_export_options(const ExportFormat& format, const ExportOptions& options) {
   const std::pair<const char*, bool> given[] = {{"grid", !options.grid.empty()},
-                                                {"compact", options.compact}};
+                                                {"compact", options.compact},
+                                                {"outside", options.outside},
+                                                {"watertight", options.watertight}};
   for (const auto& [name, is_given] : given) {
     const auto has = [name = std::string(" ") + name](const ExportFormat& other) {
       return (other.options + std::string(" ")).find(name + " ") != std::string::npos;
@@ -103,6 +106,12 @@ bool DagExport::has_voxels(const Selection& selection) const {
   return found;
 }
 
+void DagExport::fill(const DagView& dag, uint32_t grid_levels) {
+  if (filled_ && filled_->view().grid_levels() == grid_levels) return;
+  filled_.reset();
+  filled_.emplace(dag, grid_levels, file_.path(), budget_);
+}
+
 ExportReport DagExport::write(FileSystem& files, const Selection& selection,
                               const std::string& output, Progress& progress,
                               const CancelToken& cancel) {
@@ -115,9 +124,11 @@ ExportReport DagExport::write(FileSystem& files, const Selection& selection,
   const auto write = [&] {
     if (!turn_.is_none() && !turned_ && !dag_.empty())
       turned_.emplace(dag_, turn_, file_.path(), budget_, cancel);
+    const DagView& dag = turned_ ? turned_->view() : dag_;
+    if (request_.options.outside && !dag.empty()) fill(dag, selection.grid_levels);
     const ExportJob job{outputs.files(),
                         file_,
-                        turned_ ? turned_->view() : dag_,
+                        dag,
                         watched,
                         turned,
                         output,
@@ -127,7 +138,8 @@ ExportReport DagExport::write(FileSystem& files, const Selection& selection,
                         progress,
                         cancel,
                         turn_,
-                        request_.options};
+                        request_.options,
+                        filled_ ? &filled_->view() : nullptr};
     if (dag_.empty()) refuse_empty(job);
     return request_.format->write(job);
   };

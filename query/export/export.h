@@ -38,8 +38,10 @@ enum class UpAxis { kOfFormat, kY, kZ };
 // Options that only some formats have, except `up`, which all formats have.
 struct ExportOptions {
   UpAxis up = UpAxis::kOfFormat;
-  std::string grid;      // vdb, nvdb: density or mask; "" means density
-  bool compact = false;  // npz: leave out arrays that can be computed from the others
+  std::string grid;         // vdb, nvdb: density or mask; "" means density
+  bool compact = false;     // npz: leave out arrays that can be computed from the others
+  bool outside = false;     // glb: only faces that are visible from outside
+  bool watertight = false;  // glb: no vertex of a rectangle is within the side of another one
 };
 
 struct ExportFormat {

@@ -419,9 +419,12 @@ def glb_rectangles(path, grid):
         for view in document["bufferViews"]
     ]
     accessors = document["accessors"]
-    positions = numpy.frombuffer(views[0], "<f4").reshape(-1, 3)
-    indices = numpy.frombuffer(views[1], "<u4")
+    assert document["extensionsRequired"] == ["KHR_mesh_quantization"]
+    assert accessors[0]["componentType"] == 5123 and document["bufferViews"][0]["byteStride"] == 8
+    positions = numpy.frombuffer(views[0], "<u2").reshape(-1, 4)[:, :3]
+    indices = numpy.frombuffer(views[1], {5123: "<u2", 5125: "<u4"}[accessors[1]["componentType"]])
     assert accessors[0]["count"] == len(positions) and accessors[1]["count"] == len(indices)
+    assert len(numpy.unique(positions, axis=0)) == len(positions), "a vertex comes twice"
     assert (positions.min(axis=0) == accessors[0]["min"]).all()
     assert (positions.max(axis=0) == accessors[0]["max"]).all()
     triangles = positions[indices].astype(numpy.float64).reshape(-1, 2, 3, 3)

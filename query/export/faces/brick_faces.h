@@ -1,6 +1,8 @@
 // Finds the faces between set and empty cells of a brick. Results are masks with one bit per cell.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/dag/brick.h"
@@ -30,5 +32,28 @@ inline uint64_t faces_of_brick(uint64_t mask, uint64_t neighbor, uint8_t axis, b
            (neighbor >> shift & layer[0]);
   return mask & ~next;
 }
+
+// Reorders the cells of a brick from Morton order to rows along the axis after `axis`. In the
+// result, the bit of a cell is 16 i + 4 v + u: i is its coordinate along `axis`, u along the axis
+// after that, and v along the last axis; z is followed by x.
+class BrickRowOrder {
+ public:
+  explicit BrickRowOrder(int axis) {
+    for (int bit = 0; bit < 64; ++bit) {
+      const int to = 16 * brick_coordinate(bit, axis) + 4 * brick_coordinate(bit, (axis + 2) % 3) +
+                     brick_coordinate(bit, (axis + 1) % 3);
+      for (size_t byte = 0; byte < 256; ++byte)
+        if (byte >> bit % 8 & 1) of_[static_cast<size_t>(bit / 8)][byte] |= uint64_t{1} << to;
+    }
+  }
+  uint64_t operator()(uint64_t mask) const {
+    uint64_t rows = 0;
+    for (size_t i = 0; i < 8; ++i) rows |= of_[i][mask >> 8 * i & 255];
+    return rows;
+  }
+
+ private:
+  std::array<std::array<uint64_t, 256>, 8> of_{};
+};
 
 }  // namespace voxdag::query

@@ -16,6 +16,8 @@ void digest_glb(const std::string& path, const Grid& grid, Digest& digest) {
   const uint64_t positions = binary + views[0].value("byteOffset", uint64_t{0});
   const uint64_t indices = binary + views[1].value("byteOffset", uint64_t{0});
   const uint64_t count = scene["accessors"][1]["count"];
+  const bool short_positions = scene["accessors"][0]["componentType"] == 5123;
+  const bool short_indices = scene["accessors"][1]["componentType"] == 5123;
   std::array<double, 3> scale, translation;
   for (size_t axis = 0; axis < 3; ++axis) {
     scale[axis] = node["scale"][axis];
@@ -24,10 +26,13 @@ void digest_glb(const std::string& path, const Grid& grid, Digest& digest) {
   using Corner = std::array<int64_t, 3>;
   const auto corner = [&](uint64_t index) {
     Corner at;
+    const uint64_t vertex = short_indices ? file.get<uint16_t>(indices + 2 * index)
+                                          : file.get<uint32_t>(indices + 4 * index);
     for (int axis = 0; axis < 3; ++axis) {
       const auto a = static_cast<size_t>(axis);
-      const auto position = file.get<float>(
-          positions + 12 * uint64_t{file.get<uint32_t>(indices + 4 * index)} + 4 * a);
+      const double position =
+          short_positions ? static_cast<double>(file.get<uint16_t>(positions + 8 * vertex + 2 * a))
+                          : static_cast<double>(file.get<float>(positions + 12 * vertex + 4 * a));
       at[a] = grid.cell(axis, position * scale[a] + translation[a], 0);
     }
     return at;

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -142,28 +143,43 @@ inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& byt
   };
   const auto& color_accessor =
       document["accessors"][primitive["attributes"]["COLOR_0"].get<size_t>()];
+  const auto& index_accessor = document["accessors"][primitive["indices"].get<size_t>()];
   EXPECT_EQ(color_accessor["normalized"], true);
-  const size_t vertices = color_accessor["count"].get<size_t>();
-  FileNumbers positions = values_of(primitive["attributes"]["POSITION"], 5126, "VEC3");
-  FileNumbers colors = values_of(primitive["attributes"]["COLOR_0"], 5123, "VEC4");
   EXPECT_FALSE(document["materials"][0]["pbrMetallicRoughness"].contains("baseColorFactor"));
+  using Vertex = std::array<uint16_t, 4>;
+  std::vector<Vertex> positions(color_accessor["count"].get<size_t>()), colors(positions.size());
+  FileNumbers position = values_of(primitive["attributes"]["POSITION"], 5123, "VEC3");
+  for (Vertex& at : positions) at = position.next<Vertex>();  // with two bytes of padding
+  FileNumbers color_numbers = values_of(primitive["attributes"]["COLOR_0"], 5123, "VEC4");
+  for (Vertex& color : colors) color = color_numbers.next<Vertex>();
+  std::set<std::pair<Vertex, Vertex>> vertices;
+  for (size_t i = 0; i < positions.size(); ++i)
+    EXPECT_TRUE(vertices.insert({positions[i], colors[i]}).second) << "a vertex comes twice";
+  const int index_type = positions.size() < 65536 ? 5123 : 5125;
+  FileNumbers indices = values_of(primitive["indices"], index_type, "SCALAR");
+  const auto next_index = [&]() -> size_t {
+    return index_type == 5123 ? indices.next<uint16_t>() : indices.next<uint32_t>();
+  };
   std::map<std::pair<Cell3, int>, Color3> faces;
-  rectangles = vertices / 4;
+  rectangles = index_accessor["count"].get<size_t>() / 6;
   for (size_t quad = 0; quad < rectangles; ++quad) {
-    std::array<std::array<float, 3>, 4> corners{};
-    std::array<std::array<uint16_t, 4>, 4> of_corners{};
-    for (auto& corner : corners) corner = positions.next<std::array<float, 3>>();
-    for (auto& color : of_corners) color = colors.next<std::array<uint16_t, 4>>();
-    for (const auto& color : of_corners) {
-      EXPECT_EQ(color, of_corners[0]);
-      EXPECT_EQ(color[3], 65535);
-    }
+    std::array<size_t, 6> corner{};
+    for (size_t& index : corner) index = next_index();
+    EXPECT_TRUE(corner[0] == corner[3] && corner[2] == corner[4]) << "two triangles";
+    const Vertex& color = colors.at(corner[0]);
+    EXPECT_EQ(color[3], 65535);
     std::array<double, 3> a{}, b{}, low{}, high{};
+    low.fill(1e9);
+    for (const size_t index : corner) {
+      EXPECT_EQ(colors.at(index), color);
+      for (size_t i = 0; i < 3; ++i) {
+        low[i] = std::min<double>(low[i], positions.at(index)[i]);
+        high[i] = std::max<double>(high[i], positions.at(index)[i]);
+      }
+    }
     for (size_t i = 0; i < 3; ++i) {
-      a[i] = corners[1][i] - corners[0][i];
-      b[i] = corners[2][i] - corners[0][i];
-      low[i] = std::min({corners[0][i], corners[1][i], corners[2][i], corners[3][i]});
-      high[i] = std::max({corners[0][i], corners[1][i], corners[2][i], corners[3][i]});
+      a[i] = double{1} * positions[corner[1]][i] - positions[corner[0]][i];
+      b[i] = double{1} * positions[corner[2]][i] - positions[corner[0]][i];
     }
     for (size_t axis = 0; axis < 3; ++axis) {
       const size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -175,9 +191,9 @@ inline std::map<std::pair<Cell3, int>, Color3> decode_glb(const std::string& byt
           cell[u] += static_cast<int64_t>(s);
           cell[v] += static_cast<int64_t>(t);
           cell[axis] += static_cast<int64_t>(low[axis]) - (normal > 0 ? 1 : 0);
-          const Color3 color = {of_corners[0][0], of_corners[0][1], of_corners[0][2]};
           const int direction = 2 * static_cast<int>(axis) + (normal > 0 ? 0 : 1);
-          EXPECT_TRUE(faces.emplace(std::pair(cell, direction), color).second) << "a face twice";
+          const Color3 of_face = {color[0], color[1], color[2]};
+          EXPECT_TRUE(faces.emplace(std::pair(cell, direction), of_face).second) << "a face twice";
         }
     }
   }

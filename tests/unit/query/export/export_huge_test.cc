@@ -167,8 +167,9 @@ TEST_F(ExportHuge, SvdagCountsWordsWith32Bits) {
                  "8 (256");
 }
 
-// The number of rectangles decides the size of a .glb file. A checkerboard has the most: every
-// voxel has six faces, and no two faces can be merged.
+// The numbers of triangles and vertices decide the size of a .glb file. A checkerboard has the most
+// triangles: every voxel has six faces, and no two faces can be merged. Its vertices are all
+// corners of cells, except four corners of the grid.
 TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
   constexpr uint32_t kLevels = 6;
   GlobalFileWriter writer(system_files(), folder_.file("a.vdag"),
@@ -179,29 +180,27 @@ TEST_F(ExportHuge, GlbCountsBytesWith32Bits) {
     write_level(writer, level, 1, {0xff, 0, 0, 0, 0, 0, 0, 0, 0});
     svo_nodes += uint64_t{1} << 3 * level;
   }
-  constexpr uint64_t kVoxels = uint64_t{1} << (3 * kLevels - 1), kQuadBytes = 72;
+  constexpr uint64_t kVoxels = uint64_t{1} << (3 * kLevels - 1), kCorners = 65 * 65 * 65 - 4;
+  constexpr uint64_t kMeshBytes = 6 * kVoxels * 24 + kCorners * 8;
   writer.finish({kVoxels, svo_nodes});
 
   // The file has exactly one byte more than the limit of the first export, and exactly as many
   // bytes as the limit of the last export.
   ExportFormat format = export_format("glb");
-  format.write = [](const ExportJob& job) {
-    return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes - 1);
-  };
+  format.write = [](const ExportJob& job) { return write_glb_within(job, 4096 + kMeshBytes - 1); };
   const Error refused = error_of([&] { run(format, kLevels); });
   EXPECT_EQ(refused.code(), ErrorCode::kLimit);
   EXPECT_TRUE(refused.message().ends_with(
-      ": over 786 431 rectangles are needed, but a .glb file has at most 54.00 MiB. --level 5 (32 "
-      "voxels per edge) fits, or take a smaller --region"))
+      ": the mesh is too large: a .glb file has at most 20.10 MiB. --level 5 (32 voxels per edge) "
+      "fits, or take a smaller --region"))
       << refused.message();
   EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";
-  EXPECT_EQ(run(format, kLevels - 1).notes[0], "6 rectangles, 12 triangles");
+  EXPECT_EQ(run(format, kLevels - 1).notes[0], "6 rectangles, 12 triangles, 8 vertices");
   system_files().remove(folder_.file("out.x"));
 
-  format.write = [](const ExportJob& job) {
-    return write_glb_within(job, 4096 + 6 * kVoxels * kQuadBytes);
-  };
-  EXPECT_EQ(run(format, kLevels).notes[0], "786 432 rectangles, 1 572 864 triangles");
+  format.write = [](const ExportJob& job) { return write_glb_within(job, 4096 + kMeshBytes); };
+  EXPECT_EQ(run(format, kLevels).notes[0],
+            "786 432 rectangles, 1 572 864 triangles, 274 621 vertices");
 }
 
 }  // namespace

@@ -137,6 +137,7 @@ TEST_F(ExportOptionsTest, NumbersOfNotesAreFacts) {
   EXPECT_EQ(names("hashdag"), std::vector<std::string>{"scene_depth"});
   EXPECT_EQ(names("vox"), (std::vector<std::string>{"instances", "palette_colors"}));
   EXPECT_EQ(names("vtu"), std::vector<std::string>{"points"});
+  EXPECT_EQ(names("glb"), (std::vector<std::string>{"rectangles", "triangles", "vertices"}));
 }
 
 }  // namespace

@@ -95,7 +95,8 @@ TEST_F(ExportSharing, NotesSayWhatToSet) {
                                   "numpy.load() gives 'cells' (int32), 'positions' (their centers, "
                                   "float64) and 'grid' (low corner of the grid and edge of a "
                                   "voxel)"});
-  EXPECT_EQ(run("glb").notes, std::vector<std::string>{"384 rectangles, 768 triangles"});
+  EXPECT_EQ(run("glb").notes,
+            std::vector<std::string>{"384 rectangles, 768 triangles, 512 vertices"});
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ TEST_F(ExportTiles, FullGridsTakeLittle) {
     EXPECT_EQ(report.voxels, voxels);
     EXPECT_LT(report.bytes, uint64_t{1} << 20);
     if (name == "glb") {
-      EXPECT_EQ(report.notes[0], "6 rectangles, 12 triangles");
+      EXPECT_EQ(report.notes[0], "6 rectangles, 12 triangles, 8 vertices");
     }
   }
 }

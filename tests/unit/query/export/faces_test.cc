@@ -1,14 +1,17 @@
-// Tests faces_of_brick() and BrickMap against simple loops, and PlaneSort against a plain sort.
+// Tests faces_of_brick() and BrickRowOrder against simple loops, and BrickRows against a plain
+// sort.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <random>
+#include <set>
+#include <span>
+#include <utility>
 #include <vector>
 
-#include "core/geometry/morton.h"
 #include "query/export/faces/brick_faces.h"
-#include "query/export/faces/brick_map.h"
-#include "query/export/faces/plane_sort.h"
+#include "query/export/faces/brick_rows.h"
 
 namespace voxdag::query {
 namespace {
@@ -41,55 +44,82 @@ TEST(Faces, OfRandomBricks) {
   }
 }
 
-// The planes have many faces, few faces, or none.
-TEST(Faces, AreSortedByPlane) {
-  MemoryBudget budget(uint64_t{1} << 26);
-  std::mt19937_64 random(2);
-  for (const uint64_t extent : {uint64_t{100}, uint64_t{1} << kFaceCoordinateBits}) {
-    std::vector<uint64_t> faces;
-    for (const auto& [plane, count] : {std::pair{3, 1}, {4, 5000}, {6, 200}, {7, 3000}, {9, 2}})
-      for (int i = 0; i < count; ++i)
-        faces.push_back(
-            face_of(static_cast<uint64_t>(plane), random() % extent, random() % extent));
-    std::ranges::shuffle(faces, random);
-    PlaneSort sort(budget, 10, "faces");
-    for (const uint64_t face : faces) sort.count(face >> 2 * kFaceCoordinateBits, 1);
-    sort.reserve();
-    for (const uint64_t face : faces) sort.add(face >> 2 * kFaceCoordinateBits, face);
-    const auto sorted = sort.sort();
-    std::ranges::sort(faces);
-    EXPECT_TRUE(std::ranges::equal(sorted, faces));
+// A brick in the order of rows has the cell (i, v, u) at bit 16 i + 4 v + u.
+TEST(Faces, BricksInTheOrderOfRows) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const BrickRowOrder order(axis);
+    for (int bit = 0; bit < 64; ++bit) {
+      const int i = brick_coordinate(bit, axis), u = brick_coordinate(bit, (axis + 1) % 3),
+                v = brick_coordinate(bit, (axis + 2) % 3);
+      ASSERT_EQ(order(uint64_t{1} << bit), uint64_t{1} << (16 * i + 4 * v + u));
+    }
+    ASSERT_EQ(order(~uint64_t{0}), ~uint64_t{0});
   }
 }
 
-// The map has one full cube. Outside the cube, it has single bricks in a grid of 8x8x8 bricks: each
-// brick whose Morton code is not a multiple of 3. The mask of such a brick is its Morton code.
-TEST(Faces, NeighborsInBrickMap) {
-  BrickMap map;
-  constexpr uint64_t kCube = 64 * 3;  // Morton code of a cube of 4x4x4 bricks
-  const auto mask_of = [](uint64_t morton) -> uint64_t {
-    if (morton >= kCube && morton < kCube + 64) return ~uint64_t{0};
-    return morton < 512 && morton % 3 != 0 ? morton : 0;
-  };
-  for (uint64_t morton = 0; morton < 512; ++morton) {
-    if (morton == kCube) map.add(FullCube{kCube, 16});
-    if (const uint64_t mask = mask_of(morton); mask != 0 && mask != ~uint64_t{0})
-      map.add(BrickMask{morton, mask});
+struct TestBrick {
+  Position at;  // in bricks
+  uint64_t mask;
+};
+
+// Checks that `sorted` has the bricks `bricks` in the order of an axis.
+void expect_sorted(std::span<const RowBrick> sorted, size_t axis, std::vector<TestBrick> bricks) {
+  const size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
+  std::ranges::sort(bricks, [&](const TestBrick& a, const TestBrick& b) {
+    return std::array{a.at[axis], a.at[v], a.at[u]} < std::array{b.at[axis], b.at[v], b.at[u]};
+  });
+  ASSERT_EQ(sorted.size(), bricks.size());
+  for (size_t i = 0; i < bricks.size(); ++i) {
+    ASSERT_EQ(static_cast<int64_t>(sorted[i].slab()), bricks[i].at[axis]);
+    ASSERT_EQ(static_cast<int64_t>(sorted[i].v()), bricks[i].at[v]);
+    ASSERT_EQ(static_cast<int64_t>(sorted[i].u()), bricks[i].at[u]);
+    ASSERT_EQ(sorted[i].mask, bricks[i].mask);
   }
-  for (size_t i = 0; i < map.bricks().size(); ++i)
-    for (uint8_t axis = 0; axis < 3; ++axis)
-      for (const bool upward : {false, true}) {
-        uint32_t at[3];
-        const uint64_t morton = map.bricks()[i].morton;
-        morton_decode(morton, at[0], at[1], at[2]);
-        at[axis] += upward ? 1 : -1u;
-        const uint64_t expected =
-            at[axis] < 8 ? mask_of(morton_encode(at[0], at[1], at[2])) : uint64_t{0};
-        ASSERT_EQ(map.mask_at(BrickMap::next_morton(morton, axis, upward), i, upward), expected);
-        ASSERT_EQ(map.mask_at(BrickMap::next_morton(morton, axis, upward),
-                              upward ? 0 : map.bricks().size(), upward),
-                  expected);
-      }
+}
+
+// Few bricks, and enough bricks for the radix sort, in a small and in the largest grid.
+TEST(Faces, BricksAreSortedByRows) {
+  std::mt19937_64 random(2);
+  for (const auto& [count, extent] : {std::pair{100, 32}, {5000, 64}, {3000, 1 << 18}}) {
+    MemoryBudget budget(uint64_t{1} << 26);
+    BrickRows rows(budget, static_cast<uint64_t>(count), 0, "bricks");
+    std::set<Position> used;
+    std::vector<TestBrick> bricks;
+    while (bricks.size() < static_cast<size_t>(count)) {
+      Position at{};
+      for (int64_t& coordinate : at)
+        coordinate = static_cast<int64_t>(random() % static_cast<uint64_t>(extent));
+      if (!used.insert(at).second) continue;
+      bricks.push_back({at, random()});
+      rows.add({4 * at[0], 4 * at[1], 4 * at[2]}, bricks.back().mask);
+    }
+    for (size_t axis = 0; axis < 3; ++axis)
+      expect_sorted(rows.sorted(static_cast<int>(axis)), axis, bricks);
+  }
+}
+
+// Of a full cube, only the two sides are listed, without the faces between the sides.
+TEST(Faces, FullCubesHaveTwoSides) {
+  MemoryBudget budget(uint64_t{1} << 20);
+  BrickRows rows(budget, 1, 16, "bricks");
+  rows.add({0, 0, 0}, 5);
+  rows.add_full_cube({16, 32, 48}, 16);
+  for (size_t axis = 0; axis < 3; ++axis) {
+    std::vector<TestBrick> bricks = {{{0, 0, 0}, 5}};
+    for (int64_t x = 4; x < 8; ++x)
+      for (int64_t y = 8; y < 12; ++y)
+        for (int64_t z = 12; z < 16; ++z) {
+          const int64_t inside = std::array{x - 4, y - 8, z - 12}[axis];
+          if (inside == 0 || inside == 3) bricks.push_back({{x, y, z}, ~uint64_t{0}});
+        }
+    const std::span<const RowBrick> sorted = rows.sorted(static_cast<int>(axis));
+    expect_sorted(sorted, axis, bricks);
+    for (const RowBrick& brick : sorted.subspan(1)) {
+      const bool is_low = brick.slab() == 4 * (axis + 1);
+      EXPECT_EQ(brick.has_faces(false), is_low);
+      EXPECT_EQ(brick.has_faces(true), !is_low);
+    }
+  }
 }
 
 }  // namespace

@@ -1,0 +1,32 @@
+// A copy of a DAG in which the enclosed space is filled: empty cells that are not connected with
+// the space around the grid, through common faces of empty cells, are set. The surface of this DAG
+// is the part of the original surface that is visible from outside. The time depends on the number
+// of unique nodes (core/dag/space/space_labels.h).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/memory_budget.h"
+#include "core/base/page_buffer.h"
+#include "query/dag/dag_view.h"
+
+namespace voxdag::query {
+
+class FilledDag {
+ public:
+  // Fills the cells of the grid with 2^grid_levels cells per edge: the grid of `dag`, or a coarser
+  // grid. `dag` must not be empty. `path` is the name of the file in messages. Throws
+  // Error{kOutOfMemory} if the copy does not fit in the budget, and Error{kCorrupt} if words of a
+  // level are not nodes.
+  FilledDag(const DagView& dag, uint32_t grid_levels, const std::string& path,
+            MemoryBudget& budget);
+  const DagView& view() const { return *view_; }
+
+ private:
+  std::vector<PageBuffer<uint32_t>> levels_;
+  std::optional<DagView> view_;
+};
+
+}  // namespace voxdag::query
