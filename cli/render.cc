@@ -33,7 +33,7 @@ struct RenderCommand {
   std::string view = "auto";
   std::string camera, target;  // as typed
   std::optional<double> fov_degrees;
-  std::string background = "sky";
+  std::string background = "sky", shade = "color";
   std::string size = "1280x720", memory;
   query::RenderOptions options{.threads = default_threads()};
   bool gray = false;
@@ -127,8 +127,8 @@ void check_outputs(const RenderCommand& command, GuardedOutputs& files) {
 }
 
 // Throws Error{kOutOfMemory}, before any work is done, if a picture or depth map of the requested
-// size exceeds --memory.
-void check_memory(const RenderCommand& command) {
+// size exceeds --memory. `shade_bytes` is the memory of --shade.
+void check_memory(const RenderCommand& command, uint64_t shade_bytes = 0) {
   const uint64_t limit = memory_limit(command.memory);
   // The picture is written and freed before the depth map is computed, so they are never in memory
   // together. If both are requested, the picture's memory is checked, because it is larger.
@@ -136,7 +136,8 @@ void check_memory(const RenderCommand& command) {
                                 ? query::kDepthBytesPerPixel
                                 : query::render_bytes_per_pixel(command.options.background);
   const uint64_t bytes = of_pixel * static_cast<uint64_t>(command.options.width) *
-                         static_cast<uint64_t>(command.options.height);
+                             static_cast<uint64_t>(command.options.height) +
+                         shade_bytes;
   if (bytes > limit)
     throw Error(ErrorCode::kOutOfMemory, "--size " + command.size + " takes " + size_text(bytes) +
                                              " of memory, expected at most " + size_text(limit) +
@@ -150,6 +151,7 @@ void run(RenderCommand& command, CommandContext& context) {
                                               "': expected a width and a height of 1 to " +
                                               std::to_string(kMaxPictureEdge) + " pixels");
   command.options.background = query::background_named(command.background);
+  command.options.shade = query::shade_named(command.shade);
   command.options.width = width;
   command.options.height = height;
   GuardedOutputs files(context.files);
@@ -158,6 +160,7 @@ void run(RenderCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar(command.quiet);
   const auto file = open_global_file(command.input);
   const query::DagView dag(*file);
+  check_memory(command, query::shade_bytes(dag, command.options.shade));
   if (!command.gray) command.options.colors = file.get();
   if (dag.empty())
     progress->warn(command.input + " has no voxels: the picture shows only the background");
@@ -196,6 +199,13 @@ void declare(Command& command, RenderCommand& state) {
       .show_default();
   command.option("--background", state.background, "what pixels without a surface show")
       .one_of(query::background_names())
+      .show_default();
+  command
+      .option(
+          "--shade", state.shade,
+          "what the colors show: the scene's colors, how often equal parts occur (sharing), the "
+          "levels of the visible cells, or the normals")
+      .one_of(query::shade_names())
       .show_default();
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
   command.option("--memory", state.memory,

@@ -58,13 +58,14 @@ void check_memory(int width, int height, const std::string& background, const st
 // camera.
 void render(const PathText& path, const std::string& view, const std::optional<Point>& camera,
             const Point& target, std::optional<double> fov_degrees, int samples,
-            const std::string& background, bool gray, unsigned threads, nb::object progress,
-            const Pixels& pixels) {
+            const std::string& background, const std::string& shade, bool gray, unsigned threads,
+            nb::object progress, const Pixels& pixels) {
   query::RenderOptions options;
   options.height = static_cast<int>(pixels.shape(0));
   options.width = static_cast<int>(pixels.shape(1));
   options.samples = samples;
   options.background = query::background_named(background);
+  options.shade = query::shade_named(shade);
   options.threads = threads ? threads : default_threads();
   uint8_t* const to = pixels.data();
   run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
@@ -93,7 +94,8 @@ void bind_render(nb::module_& module) {
              nb::arg("background"), nb::arg("memory"));
   module.def("render", &render, nb::arg("path"), nb::arg("view"), nb::arg("camera").none(),
              nb::arg("target"), nb::arg("fov").none(), nb::arg("samples"), nb::arg("background"),
-             nb::arg("gray"), nb::arg("threads"), nb::arg("progress").none(), nb::arg("pixels"));
+             nb::arg("shade"), nb::arg("gray"), nb::arg("threads"), nb::arg("progress").none(),
+             nb::arg("pixels"));
 }
 
 }  // namespace voxdag::python

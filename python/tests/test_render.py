@@ -37,6 +37,19 @@ def test_the_background_can_be_transparent_or_white(path):
     assert np.all(voxdag.render(path, background="white", **options)[0] > 250)  # a faint shadow
 
 
+def test_shades_show_normals_levels_and_sharing(path):
+    options = {"view": "top", "size": (48, 32), "samples": 1, "background": "transparent"}
+    pictures = [
+        voxdag.render(path, shade=shade, **options)
+        for shade in ("color", "sharing", "level", "normal")
+    ]
+    for i, picture in enumerate(pictures):
+        assert np.array_equal(picture[:, :, 3], pictures[0][:, :, 3])
+        assert not any(np.array_equal(picture, other) for other in pictures[:i])
+    up = pictures[3][pictures[3][:, :, 3] == 255][:, 1]
+    assert np.median(up) > 200  # seen from above, most normals point up
+
+
 def test_a_camera_is_placed_in_scene_units(path):
     def picture(distance):
         return voxdag.render(
@@ -60,6 +73,7 @@ def test_a_camera_is_placed_in_scene_units(path):
         ({"fov": 171}, "invalid_input"),
         ({"samples": 9}, "invalid_input"),
         ({"background": "blue"}, "invalid_input"),
+        ({"shade": "blue"}, "invalid_input"),
         ({"background": ["sky"]}, "invalid_input"),
         ({"size": (-1, 10)}, "invalid_input"),
         ({"size": (2**31, 2**31)}, "invalid_input"),

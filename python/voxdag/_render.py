@@ -13,6 +13,7 @@ from ._types import Bytes
 
 _MAX_EDGE = 16384  # pixels
 _BACKGROUNDS = ("sky", "white", "transparent")
+_SHADES = ("color", "sharing", "level", "normal")
 
 
 def render(
@@ -25,6 +26,7 @@ def render(
     size: tuple[int, int] = (1280, 720),
     samples: int = 2,
     background: str = "sky",
+    shade: str = "color",
     gray: bool = False,
     memory: Union[int, str, None] = None,
     threads: int = 0,
@@ -47,6 +49,9 @@ def render(
     samples          number of samples along each edge of a pixel, from 1 to 8. A pixel is the mean
                      of samples * samples samples.
     background       color of pixels that show no surface: "sky", "white" or "transparent"
+    shade            what the colors of surfaces show: "color" (the scene's colors), "sharing" (how
+                     often equal parts of the DAG occur), "level" (the levels of the visible cells)
+                     or "normal" (the normals)
     gray             if True, ignores the colors of the file
     memory           memory limit, as a number of bytes or as text such as "8GiB". The default is
                      half of the machine's memory. A picture needs 66 bytes per pixel, or 68 with a
@@ -74,6 +79,8 @@ def render(
         raise Error(
             f"background {background!r}: expected one of {', '.join(_BACKGROUNDS)}", "invalid_input"
         )
+    if shade not in _SHADES:
+        raise Error(f"shade {shade!r}: expected one of {', '.join(_SHADES)}", "invalid_input")
     if not isinstance(gray, (bool, np.bool_)):
         raise Error(f"gray {gray!r}: expected True or False", "invalid_input")
     samples = _whole(samples, 1, 8, f"samples {samples!r}: expected 1 to 8")
@@ -92,6 +99,7 @@ def render(
             degrees,
             samples,
             background,
+            shade,
             bool(gray),
             threads,
             callback,

@@ -166,6 +166,7 @@ class RenderOptions(TypedDict, total=False):
     size: tuple[int, int]
     samples: int
     background: str
+    shade: str
     gray: bool
     memory: int | str | None
     threads: int

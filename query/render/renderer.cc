@@ -72,8 +72,9 @@ Vec tone_map(const Vec& light) {
 }
 
 // Takes samples^2 samples of the pixel (x, y) and combines them.
+template <class AlbedoOf>
 GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighting& lighting,
-                          Albedo& albedo, int samples, int x, int y) {
+                          const AlbedoOf& albedo_of, int samples, int x, int y) {
   constexpr int kSkyRays = 4;
   Vec offset, normal, reflecting, sky;
   double sun = 0, floor = 0;
@@ -92,7 +93,7 @@ GBufferPixel sample_pixel(const DagView& dag, const Camera& camera, const Lighti
     ++surfaces;
     offset = offset + ray.direction * s.t;
     normal = normal + s.normal;
-    reflecting = reflecting + albedo.of(s);
+    reflecting = reflecting + albedo_of(s);
     sky = sky + lighting.sky_light(s, kSkyRays, sampler);
     sun += lighting.sun_light(s, sampler);
   }
@@ -126,14 +127,16 @@ struct FinalPixel {
 struct ColorGrading {
   const Lighting& lighting;
   Background kind;
+  Shade shade;
   double exposure, haze_start, diagonal;
 
   FinalPixel of(const GBufferPixel& p, const Vec& background) const {
     if (kind == Background::kTransparent) return {lit(p), p.coverage};
     Vec color = background * p.floor;
     if (p.coverage > 0) {
+      const double haze = shade == Shade::kNormal ? 0 : kMaxHaze;
       const double depth = std::max(0.0, length(p.offset) - haze_start) / std::max(1.0, diagonal);
-      const Vec surface = mix(lit(p), background, kMaxHaze * (1 - std::exp(-depth * depth)));
+      const Vec surface = mix(lit(p), background, haze * (1 - std::exp(-depth * depth)));
       color = mix(color, surface, p.coverage);
     }
     return {color};
@@ -142,6 +145,7 @@ struct ColorGrading {
  private:
   Vec lit(const GBufferPixel& p) const {
     if (p.coverage == 0) return {};
+    if (shade == Shade::kNormal) return p.albedo;
     return tone_map(lighting.reflected(p.albedo, p.normal, p.sky, p.sun) * exposure);
   }
 };
@@ -172,6 +176,7 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
   const double exposure = choose_exposure(lighting, seen);
   const double haze_start = seen.empty() ? 0 : seen[0].t;
 
+  const ShadeColors shades(dag, options.shade);
   GBuffer buffer(width, height);
   progress.begin_stage("render", static_cast<uint64_t>(height), "rows");
   const unsigned workers = std::clamp(options.threads, 1u, static_cast<unsigned>(height));
@@ -181,16 +186,20 @@ Picture render_picture(const DagView& dag, const Placement& placement, const Ren
                  [&](unsigned worker, size_t row) { work(worker, static_cast<int>(row)); });
   };
   for_each_row([&](unsigned worker, int y) {
+    const auto albedo_of = [&](const SurfaceHit& surface) {
+      return options.shade == Shade::kColor ? albedos[worker].of(surface) : shades.of(surface);
+    };
     for (int x = 0; x < width; ++x) {
       cancel.check();
-      buffer.at(x, y) = sample_pixel(dag, camera, lighting, albedos[worker], options.samples, x, y);
+      buffer.at(x, y) = sample_pixel(dag, camera, lighting, albedo_of, options.samples, x, y);
     }
     progress.advance(1);
   });
   progress.end_stage();
 
   Picture picture(width, height, channels_of(options.background));
-  const ColorGrading grading{lighting, options.background, exposure, haze_start, box.diagonal()};
+  const ColorGrading grading{lighting, options.background, options.shade,
+                             exposure, haze_start,         box.diagonal()};
   for_each_row([&](unsigned, int y) {
     constexpr int kBayer[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
     const Vec background = background_of(options.background, (y + 0.5) / height);

@@ -6,6 +6,7 @@
 
 #include "core/base/progress.h"
 #include "query/dag/dag_view.h"
+#include "query/render/albedo.h"
 #include "query/render/camera.h"
 #include "query/render/g_buffer.h"
 #include "query/render/picture.h"
@@ -28,6 +29,8 @@ struct RenderOptions {
   Background background = Background::kSky;
   // The DAG's file, for its colors; null for gray.
   const voxdag_reader::File* colors = nullptr;
+  // Any value except kColor replaces the colors. kNormal also omits light and haze.
+  Shade shade = Shade::kColor;
 };
 
 // Returns the number of channels of a picture. Each channel has one byte.

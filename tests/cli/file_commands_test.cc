@@ -281,6 +281,8 @@ TEST_F(FileCommands, RenderWritesJpeg) {
                {"render", "m.vdag", "-o", "x.jpeg", "--background", "transparent"});
   expect_error(2, "--background", {"render", "m.vdag", "-o", "x.png", "--background", "blue"});
   run_json({"render", "m.vdag", "-o", "t.png", "--size", "64x48", "--background", "transparent"});
+  expect_error(2, "--shade", {"render", "m.vdag", "-o", "x.png", "--shade", "blue"});
+  run_json({"render", "m.vdag", "-o", "s.png", "--size", "64x48", "--shade", "sharing"});
   EXPECT_EQ(contents("t.png")[25], 6) << "expected RGBA";
 }
 
