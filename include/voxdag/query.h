@@ -81,6 +81,10 @@ class DagFile {
   // count() stores take at most `memory_bytes`. Throws Error{kNotFound}, Error{kIo},
   // Error{kUnsupportedVersion}, or Error{kCorrupt} for a damaged header.
   explicit DagFile(const std::string& path, uint64_t memory_bytes = kDefaultMemory);
+  // Opens a file that is already in memory: `size` bytes at `data`, which must remain valid and
+  // unchanged while the DagFile exists. They are copied if `data` is not aligned to 8 bytes. Throws
+  // Error{kUnsupportedVersion} or Error{kCorrupt}; messages call the file "memory".
+  DagFile(const void* data, uint64_t size, uint64_t memory_bytes = kDefaultMemory);
   ~DagFile();
   DagFile(DagFile&&) noexcept;
   DagFile& operator=(DagFile&&) noexcept;

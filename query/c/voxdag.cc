@@ -19,6 +19,7 @@ using voxdag::query::Position;
 
 struct voxdag_file {
   explicit voxdag_file(const char* path) : dag(path) {}
+  voxdag_file(const void* data, size_t size) : dag(data, size) {}
   const voxdag::query::DagFile dag;
 };
 
@@ -175,6 +176,15 @@ voxdag_status voxdag_open(const char* path, voxdag_file** file) {
     expect_pointer(file, "the place of the file");
     *file = nullptr;
     *file = new voxdag_file(path);
+  });
+}
+
+voxdag_status voxdag_open_memory(const void* data, size_t size, voxdag_file** file) {
+  return answer([&] {
+    expect_pointer(data, "the data");
+    expect_pointer(file, "the place of the file");
+    *file = nullptr;
+    *file = new voxdag_file(data, size);
   });
 }
 

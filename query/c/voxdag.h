@@ -124,6 +124,10 @@ VOXDAG_API const char* voxdag_version(void);
 VOXDAG_API const char* voxdag_error(void);
 
 VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
+/* Opens a file that is already in memory, such as an entry of an archive: `size` bytes at `data`.
+ * They must remain valid and unchanged until voxdag_close(). They are copied if `data` is not
+ * aligned to 8 bytes. */
+VOXDAG_API voxdag_status voxdag_open_memory(const void* data, size_t size, voxdag_file** file);
 /* Closes a file. Ignores a null pointer. No other thread may be using the file. */
 VOXDAG_API void voxdag_close(voxdag_file* file);
 /* Fills the first facts->struct_size bytes of `facts`. */

@@ -130,11 +130,18 @@ uint64_t largest_square(double distance) {
 struct DagFile::State {
   State(const std::string& path, uint64_t memory_bytes)
       : file(open_global_file(path)), view(*file), budget(memory_bytes) {}
+  State(const void* data, uint64_t size, uint64_t memory_bytes)
+      : is_mapped(false), file(open_memory(data, size)), view(*file), budget(memory_bytes) {}
 
+  static std::unique_ptr<const voxdag_reader::File> open_memory(const void* data, uint64_t size) {
+    return with_reader_errors(
+        [&] { return std::make_unique<const voxdag_reader::File>(data, size); });
+  }
   void prepare_for_queries(size_t count);
   const TopCells* top_cells(size_t points);
   const NodeCounts& counts(uint32_t grid_levels);
 
+  const bool is_mapped = true;
   const std::unique_ptr<const voxdag_reader::File> file;
   const DagView view;
   MemoryBudget budget;
@@ -154,7 +161,7 @@ constexpr size_t kManyQueries = size_t{1} << 14;
 // two cases in which huge pages would be slow: for a few queries, because each node would require a
 // read of 2 MiB, and for a file that is larger than half of the machine's memory.
 void DagFile::State::prepare_for_queries(size_t count) {
-  if (count < kManyQueries || file->file_bytes() > default_memory()) return;
+  if (!is_mapped || count < kManyQueries || file->file_bytes() > default_memory()) return;
   // The system may ignore this request: pages already in memory keep their size, and not every
   // system supports huge pages for files.
   std::call_once(huge_pages, [&] {
@@ -187,6 +194,8 @@ const NodeCounts& DagFile::State::counts(uint32_t grid_levels) {
 
 DagFile::DagFile(const std::string& path, uint64_t memory_bytes)
     : state_(std::make_unique<State>(path, memory_bytes)) {}
+DagFile::DagFile(const void* data, uint64_t size, uint64_t memory_bytes)
+    : state_(std::make_unique<State>(data, size, memory_bytes)) {}
 DagFile::~DagFile() = default;
 DagFile::DagFile(DagFile&&) noexcept = default;
 DagFile& DagFile::operator=(DagFile&&) noexcept = default;

@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <thread>
 
 #include "query/c/voxdag.h"
+#include "tests/unit/core/format/test_files.h"
 #include "voxdag/query.h"
 
 namespace voxdag::query {
@@ -175,6 +177,48 @@ TEST_F(CApiTest, Refuses) {
   EXPECT_EQ(voxdag_cast_rays(file_, &still, 1, nullptr, &hit), VOXDAG_INVALID_INPUT);
   EXPECT_EQ(voxdag_cast_rays(file_, &nowhere, 1, nullptr, &hit), VOXDAG_INVALID_INPUT);
   voxdag_close(nullptr);
+}
+
+// A file in memory gives the same answers as the file on disk, at an aligned and at an odd address.
+TEST_F(CApiTest, OpensAFileInMemory) {
+  const std::string bytes = read_bytes(kPath);
+  std::vector<uint64_t> words(bytes.size() / 8 + 2);
+  for (const size_t offset : {0, 1}) {
+    char* const data = reinterpret_cast<char*>(words.data()) + offset;
+    std::memcpy(data, bytes.data(), bytes.size());
+    voxdag_file* in_memory = nullptr;
+    ASSERT_EQ(voxdag_open_memory(data, bytes.size(), &in_memory), VOXDAG_OK) << voxdag_error();
+    voxdag_facts facts{};
+    facts.struct_size = sizeof facts;
+    ASSERT_EQ(voxdag_get_facts(in_memory, &facts), VOXDAG_OK);
+    EXPECT_EQ(facts.voxels, dag_.voxels());
+    const voxdag_region region = whole();
+    uint64_t count = 0;
+    ASSERT_EQ(voxdag_count(in_memory, levels_, &region, &count), VOXDAG_OK);
+    EXPECT_EQ(count, dag_.voxels());
+    voxdag_close(in_memory);
+    EXPECT_EQ(voxdag_open_memory(data, bytes.size() - 1, &in_memory), VOXDAG_CORRUPT);
+    EXPECT_EQ(in_memory, nullptr);
+    EXPECT_TRUE(std::string(voxdag_error()).starts_with("memory: ")) << voxdag_error();
+  }
+  voxdag_file* none = nullptr;
+  EXPECT_EQ(voxdag_open_memory(bytes.data(), 0, &none), VOXDAG_CORRUPT);
+  EXPECT_EQ(voxdag_open_memory(nullptr, 8, &none), VOXDAG_INVALID_INPUT);
+}
+
+// Many lookups, for which a mapped file gets huge pages and a table of its top cells.
+TEST(DagFileInMemory, AnswersManyLookups) {
+  const DagFile mapped(kPath);
+  const std::string bytes = read_bytes(kPath);
+  const DagFile in_memory(bytes.data(), bytes.size());
+  std::vector<Position> points(40000);
+  for (size_t i = 0; i < points.size(); ++i)
+    for (size_t axis = 0; axis < 3; ++axis)
+      points[i][axis] = static_cast<int64_t>(i * (7 + 6 * axis)) % mapped.resolution();
+  std::vector<uint8_t> expected(points.size()), found(points.size());
+  mapped.lookup(points, mapped.grid_levels(), expected);
+  in_memory.lookup(points, mapped.grid_levels(), found);
+  EXPECT_EQ(found, expected);
 }
 
 TEST_F(CApiTest, ErrorsBelongToTheirThread) {
