@@ -23,6 +23,7 @@ constexpr ExportFormat kFormats[] = {
      ".voxel.bin", write_voxel},
     {"vox", "MagicaVoxel", nullptr, nullptr, write_vox, UpAxis::kZ},
     {"bt", "OctoMap", nullptr, nullptr, write_bt},
+    {"ot", "OctoMap with colors, or with occupancies", nullptr, nullptr, write_ot},
 #ifdef VOXDAG_HAS_VDB
     {"vdb", "OpenVDB: Blender, Houdini", nullptr, nullptr, write_vdb, UpAxis::kY, " grid"},
     {"nvdb", "NanoVDB: renderers on GPUs", nullptr, nullptr, write_nvdb, UpAxis::kY, " grid"},

@@ -169,6 +169,7 @@ ExportReport write_svdag(const ExportJob& job);
 ExportReport write_voxel(const ExportJob& job);
 ExportReport write_vox(const ExportJob& job);
 ExportReport write_bt(const ExportJob& job);
+ExportReport write_ot(const ExportJob& job);
 ExportReport write_glb(const ExportJob& job);
 // Like write_glb(), with a different limit of the file's size in bytes. Tests use a small limit,
 // because writing files of 4 GiB takes too long.

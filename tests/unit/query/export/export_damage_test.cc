@@ -71,7 +71,8 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, ExportDamage,
-                         testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "npz", "ply"),
+                         testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ot", "npz",
+                                         "ply"),
                          [](const auto& format) { return std::string(format.param); });
 
 }  // namespace

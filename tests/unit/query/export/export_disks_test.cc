@@ -184,8 +184,8 @@ TEST_P(ExportTruncated, IsAnError) {
 
 // Exports of these formats read the input after they have created the output.
 INSTANTIATE_TEST_SUITE_P(Formats, ExportTruncated,
-                         testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ply", "npz",
-                                         "vtu", "inp"),
+                         testing::Values("hashdag", "svdag", "voxel", "vox", "bt", "ot", "ply",
+                                         "npz", "vtu", "inp"),
                          name_of);
 
 INSTANTIATE_TEST_SUITE_P(Formats, ExportKilled, testing::Values("hashdag", "ply"), name_of);

@@ -138,7 +138,8 @@ TEST_F(ExportLimits, ProgressIsReported) {
     stages.expect_complete();
     EXPECT_TRUE(stages.stages.contains("export"));
     const bool is_counted =
-        std::string_view("bt vdb nvdb ply npz vtu inp glb").find(format.name) != std::string::npos;
+        std::string_view("bt ot vdb nvdb ply npz vtu inp glb").find(format.name) !=
+        std::string::npos;
     EXPECT_EQ(stages.stages.contains("count"), is_counted);
   }
 }
