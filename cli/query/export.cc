@@ -119,7 +119,12 @@ void declare(Command& command, ExportCommand& state) {
               "otherwise y)")
       .one_of({"y", "z"});
   command.option("--grid", state.options.grid,
-                 "vdb, nvdb: density (default), a fog volume, or mask, which is smaller");
+                 "vdb, nvdb: density (default), a fog volume; mask, which is smaller; or sdf, the "
+                 "distance to the surface of a solid");
+  command
+      .option("--band", state.options.band,
+              "N: with --grid sdf: distances up to N voxels from the surface, 1 to 16 (default: 3)")
+      .positive();
   const Option chunks_option =
       command
           .option("--chunks", state.chunks,

@@ -71,6 +71,7 @@ query::ExportOptions export_options(const nlohmann::json& given) {
   if (up == "y") options.up = query::UpAxis::kY;
   if (up == "z") options.up = query::UpAxis::kZ;
   options.grid = given.value("grid", "");
+  options.band = given.value("band", 0);
   options.compact = given.value("compact", false);
   options.outside = given.value("outside", false);
   options.watertight = given.value("watertight", false);

@@ -85,6 +85,7 @@ def export(
     gray: bool = False,
     up: Optional[str] = None,
     grid: Optional[str] = None,
+    band: Optional[int] = None,
     compact: bool = False,
     outside: bool = False,
     watertight: bool = False,
@@ -105,7 +106,10 @@ def export(
     gray                  if True, omits the colors of the file
     up                    "y" or "z": the axis of the exported file that gets the y axis of the
                           .vdag file. The default is "z" for vox, and "y" for the other formats.
-    grid                  for vdb and nvdb: "density" (the default) or "mask"
+    grid                  for vdb and nvdb: "density" (the default), "mask", or "sdf", the distance
+                          to the surface of a solid
+    band                  with grid="sdf": the largest distance, in voxels, 1 to 16. The default is
+                          3.
     compact               for npz: if True, omits the positions, which can be computed from the
                           cells
     outside               for glb: if True, writes only the faces that are visible from outside
@@ -124,6 +128,7 @@ def export(
         {
             "up": up or "",
             "grid": grid or "",
+            "band": band or 0,
             "compact": bool(compact),
             "outside": bool(outside),
             "watertight": bool(watertight),

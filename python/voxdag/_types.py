@@ -149,6 +149,7 @@ class ExportOptions(TypedDict, total=False):
     gray: bool
     up: str | None
     grid: str | None
+    band: int | None
     compact: bool
     outside: bool
     watertight: bool

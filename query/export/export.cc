@@ -25,8 +25,8 @@ constexpr ExportFormat kFormats[] = {
     {"bt", "OctoMap", nullptr, nullptr, write_bt},
     {"ot", "OctoMap with colors, or with occupancies", nullptr, nullptr, write_ot},
 #ifdef VOXDAG_HAS_VDB
-    {"vdb", "OpenVDB: Blender, Houdini", nullptr, nullptr, write_vdb, UpAxis::kY, " grid"},
-    {"nvdb", "NanoVDB: renderers on GPUs", nullptr, nullptr, write_nvdb, UpAxis::kY, " grid"},
+    {"vdb", "OpenVDB: Blender, Houdini", nullptr, nullptr, write_vdb, UpAxis::kY, " grid band"},
+    {"nvdb", "NanoVDB: renderers on GPUs", nullptr, nullptr, write_nvdb, UpAxis::kY, " grid band"},
 #endif
     {"ply", "point cloud: the centers of the voxels, world units", nullptr, nullptr, write_ply},
     {"npz", "numpy: the cells and the centers of the voxels", nullptr, nullptr, write_npz,
@@ -66,6 +66,7 @@ const ExportFormat& export_format(const std::string& name) {
 
 void check_export_options(const ExportFormat& format, const ExportOptions& options) {
   const std::pair<const char*, bool> given[] = {{"grid", !options.grid.empty()},
+                                                {"band", options.band != 0},
                                                 {"compact", options.compact},
                                                 {"outside", options.outside},
                                                 {"watertight", options.watertight}};

@@ -38,7 +38,8 @@ enum class UpAxis { kOfFormat, kY, kZ };
 // Options that only some formats have, except `up`, which all formats have.
 struct ExportOptions {
   UpAxis up = UpAxis::kOfFormat;
-  std::string grid;         // vdb, nvdb: density or mask; "" means density
+  std::string grid;         // vdb, nvdb: density, mask or sdf; "" means density
+  int band = 0;             // with the grid sdf: half width of the band, in voxels; 0 means 3
   bool compact = false;     // npz: leave out arrays that can be computed from the others
   bool outside = false;     // glb: only faces that are visible from outside
   bool watertight = false;  // glb: no vertex of a rectangle is within the side of another one

@@ -59,6 +59,9 @@ TURN_CASES = [(64, []), (256, ["--level", "7", "--region", "9,0,30,90,101,83"])]
 # Options of exports of the solid, whose resolution is 64.
 SOLID_CASES = [[], ["--level", "5"], ["--region", "5,0,16,64,49,60"]]
 
+# Options of exports of the solid with --grid sdf.
+LEVEL_SET_CASES = [["--level", "5"], ["--level", "4", "--band", "2"]]
+
 
 class Grid:
     """The exported grid. Converts between its cells and world coordinates.
@@ -216,6 +219,36 @@ class Test:
             assert os.path.getsize(output) < colored_bytes
             print(f"colors of level {level}: {len(expected)} voxels, {colored_bytes} bytes")
 
+    def check_level_set(self, resolution, options):
+        """Compares the values of `--grid sdf` with distances to all voxels of the other kind."""
+        path, info = self.solid()
+        given = dict(zip(options[::2], options[1::2]))
+        full, band = resolution.bit_length() - 1, int(given.get("--band", 3))
+        levels = int(given.get("--level", full))
+        grid = Grid(info, levels, None)
+        output = "level_set.vdb"
+        self.run("export", path, "--to", "vdb", "--grid", "sdf", "-o", output, "--force", *options)
+        # The cells of the grid and a margin, in which all cells are empty.
+        edge = grid.resolution + 4 * band
+        is_set = numpy.zeros((edge,) * 3, bool)
+        listed = subprocess.run(
+            [self.list_voxels, path, str(full - levels)], capture_output=True, check=True
+        )
+        cells = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 3) + 2 * band
+        is_set[tuple(cells.T)] = True
+        steps = range(-band, band + 1)
+        limit = 4 * band * band
+        squares = numpy.full(is_set.shape, limit)
+        for step in [(x, y, z) for x in steps for y in steps for z in steps]:
+            square = sum((2 * abs(d) - 1) ** 2 for d in step if d)
+            differs = numpy.roll(is_set, step, (0, 1, 2)) != is_set
+            squares[differs & (squares > square)] = square
+        expected = numpy.sqrt(squares) / 2 * grid.voxel * numpy.where(is_set, -1, 1)
+        values, active = decoders.vdb_level_set(output, grid, [-2 * band] * 3, edge, band)
+        assert numpy.abs(values - expected).max() < 1e-5 * grid.voxel
+        assert (active == (squares < limit)).all()
+        print(f"level set {' '.join(options)}: {active.sum()} active voxels")
+
     def check_refusals(self):
         """Checks that existing files and empty selections are refused, and leave no other files."""
         path, _ = self.scene(64)
@@ -252,6 +285,9 @@ def main():
             test.check(resolution, options)
         for resolution, options in TURN_CASES:
             test.check(resolution, options, turn="y" if name == "vox" else "z")
+        if name == "vdb":
+            for options in LEVEL_SET_CASES:
+                test.check_level_set(64, options)
         test.check_colors()
         test.check_refusals()
     return 0

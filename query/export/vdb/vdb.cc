@@ -1,8 +1,9 @@
 // Exports OpenVDB's .vdb and NanoVDB's .nvdb with these two libraries. A file has a grid of the
-// voxels, which is either a fog volume or a mask. If the input has colors, the file also has a grid
-// of the colors in linear light. The fog volume has the name "density", which Houdini and Blender
-// render. The color grid has the name "Cd", which both programs use. The libraries build all grids
-// in memory, so the memory is calculated first and compared with the memory budget.
+// voxels, which is a fog volume, a mask, or the level set of a solid. If the input has colors, the
+// file also has a grid of the colors in linear light. The fog volume has the name "density", which
+// Houdini and Blender render. The color grid has the name "Cd", which both programs use. The
+// libraries build all grids in memory, so the memory is calculated first and compared with the
+// memory budget.
 //
 // Half floats are converted without Imath's lookup table, because the table would require linking
 // to Imath.
@@ -25,16 +26,13 @@
 #include "query/export/export_file.h"
 #include "query/export/export_job.h"
 #include "query/export/vdb/file_buffer.h"
+#include "query/export/vdb/level_set.h"
+#include "query/export/vdb/vdb_grid.h"
 #include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
 
-// Bytes of memory for a leaf of 8^3 voxels, for a lower node of 128^3 voxels, and for an upper node
-// of 4096^3 voxels. The sizes include the pointers in the nodes.
-struct VdbNodeBytes {
-  uint64_t leaf, lower, upper;
-};
 constexpr VdbNodeBytes kOpenVdbMaskBytes = {192, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kNanoVdbMaskBytes = {96, 34 << 10, 272 << 10};
 // Sizes for a grid of floats. A leaf stores one float for each of its voxels.
@@ -45,8 +43,6 @@ constexpr VdbNodeBytes kNanoVdbFloatBytes = {2176, 34 << 10, 272 << 10};
 constexpr VdbNodeBytes kColorBytes = {6400, 66 << 10, 522 << 10};
 // Minimum size of a leaf in a .vdb file, which stores the mask twice.
 constexpr uint64_t kVdbLeafBytes = 128;
-// Bytes of a tile of 4096^3 voxels in the root's table.
-constexpr uint64_t kRootTileBytes = 128;
 constexpr const char* kColorGridName = "Cd";
 
 constexpr uint64_t kHalfBytes = 2;  // size of a half float, as .vdb files store them
@@ -58,8 +54,13 @@ struct VoxelGrid {
   const char* name;
   VdbNodeBytes open_vdb, nano_vdb;
   uint64_t value_bytes;  // bytes per voxel in a leaf of a .vdb file, not counting the masks
-  openvdb::GridBase::Ptr (*make)(const ExportJob& job, uint64_t voxels);
-  NanoGrid (*make_nano)(const ExportJob& job, uint64_t voxels);
+  // `steps` is the total of the progress (ChargedVdb).
+  openvdb::GridBase::Ptr (*make)(const ExportJob& job, uint64_t steps);
+  NanoGrid (*make_nano)(const ExportJob& job, uint64_t steps);
+  // The values are distances from the surface. The file then has no color grid.
+  bool is_level_set = false;
+
+  bool has_colors(const ExportJob& job) const { return job.has_colors && !is_level_set; }
 };
 
 VdbNodeBytes operator+(const VdbNodeBytes& a, const VdbNodeBytes& b) {
@@ -81,10 +82,6 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-struct VdbSize {
-  uint64_t voxels = 0, bytes = 0;
-  uint64_t leaf_voxels = 0;  // voxels in leaves, not in tiles (full cubes)
-};
 // True if full cubes are tiles of the grid of voxels. A grid of colors has no tiles, because the
 // voxels of a cube have different colors.
 bool has_tiles(const ExportJob& job) { return !job.has_colors; }
@@ -107,7 +104,7 @@ void for_each_vdb_part(const ExportJob& job, const Selection& selection,
 // Calls steps.advance() for each brick and each full cube.
 template <class Steps>
 VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
-                 uint64_t limit, Steps steps) {
+                 uint64_t limit, Steps&& steps) {
   VdbSize size;
   Position leaf{-1, 0, 0}, lower{-1, 0, 0}, upper{-1, 0, 0};
   const auto count = [&](const Position& corner, int shift, Position& last, uint64_t cost) {
@@ -143,42 +140,30 @@ VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNode
 
 struct ChargedVdb {
   uint64_t voxels = 0, leaf_voxels = 0;
+  uint64_t steps = 0;  // the total of the stage that makes the grid: voxels, or leaves
   MemoryCharge charge;
 };
 ChargedVdb charge_vdb(const ExportJob& job, const VoxelGrid& grid, const VdbNodeBytes& node) {
   const uint64_t limit = job.budget.available();
-  const VdbSize size =
-      vdb_size(job, job.selection, node, limit, ExportStage(job, "count", 0, "bricks"));
+  const auto size_of = [&](const Selection& selection, auto&& steps) {
+    return grid.is_level_set ? level_set_size(job, selection, node, limit, steps)
+                             : vdb_size(job, selection, node, limit, steps);
+  };
+  VdbSize size = size_of(job.selection, ExportStage(job, "count", 0, "bricks"));
+  if (grid.is_level_set) size.voxels = count_voxels(job, job.selection, UINT64_MAX);
   if (size.voxels == 0) refuse_empty(job);
   if (size.bytes > limit)
     refuse_size(
         job,
         "the grid would take over " + size_text(limit) + " of memory, the limit --memory" +
-            (job.has_colors ? " (without colors, --gray, it takes less)" : "") +
+            (grid.has_colors(job) ? " (without colors, --gray, it takes less)" : "") +
             (grid.name == std::string_view("mask") ? "" : " (--grid mask takes less)"),
         [&](uint32_t level) {
-          return vdb_size(job, coarser(job.selection, level), node, limit, CancelCheck(job))
-                     .bytes <= limit;
+          return size_of(coarser(job.selection, level), CancelCheck(job)).bytes <= limit;
         },
         ErrorCode::kOutOfMemory);
-  return {size.voxels, size.leaf_voxels, MemoryCharge(job.budget, size.bytes, "the grid")};
-}
-
-openvdb::Coord vdb_coord(const Position& cell) {
-  return openvdb::Coord(static_cast<openvdb::Int32>(cell[0]), static_cast<openvdb::Int32>(cell[1]),
-                        static_cast<openvdb::Int32>(cell[2]));
-}
-
-template <class GridType>
-typename GridType::Ptr empty_vdb_grid(const ExportJob& job, const char* name) {
-  auto grid = GridType::create();
-  grid->setName(name);
-  // OpenVDB's integer index coordinates denote the centers of voxels, so index 0 is mapped to the
-  // center of the first voxel.
-  auto transform = openvdb::math::Transform::createLinearTransform(job.cell_edge());
-  transform->postTranslate({job.world(0, 0.5), job.world(1, 0.5), job.world(2, 0.5)});
-  grid->setTransform(transform);
-  return grid;
+  return {size.voxels, size.leaf_voxels, grid.is_level_set ? size.leaves : size.voxels,
+          MemoryCharge(job.budget, size.bytes, "the grid")};
 }
 
 // Sets the voxels of a brick to value(cell).
@@ -240,11 +225,23 @@ constexpr VoxelGrid kVoxelGrids[] = {
      [](const ExportJob& job, uint64_t voxels) {
        return nano_grid(*make_voxel_grid<openvdb::MaskGrid>(job, voxels, kMaskName));
      }},
+    {"sdf", kOpenVdbFloatBytes, kNanoVdbFloatBytes, 0,
+     [](const ExportJob& job, uint64_t leaves) -> openvdb::GridBase::Ptr {
+       return make_level_set(job, leaves);
+     },
+     [](const ExportJob& job, uint64_t leaves) { return nano_grid(*make_level_set(job, leaves)); },
+     true},
 };
 
 // Returns the choice of --grid. Throws Error{kInvalidInput} for an unknown name.
 const VoxelGrid& voxel_grid(const ExportJob& job) {
   const std::string& wanted = job.options.grid;
+  const int band = job.options.band;
+  if (band != 0 && wanted != "sdf")
+    throw Error(ErrorCode::kInvalidInput, "--band: expected --grid sdf as well");
+  if (band < 0 || band > kMaxBandWidth)
+    throw Error(ErrorCode::kInvalidInput, "--band " + std::to_string(band) + ": expected 1 to " +
+                                              std::to_string(kMaxBandWidth));
   if (wanted.empty()) return kVoxelGrids[0];
   std::string names;
   for (const VoxelGrid& grid : kVoxelGrids) {
@@ -303,15 +300,15 @@ ExportReport write_grid_file(const ExportJob& job, uint64_t voxels, uint64_t min
 ExportReport write_vdb(const ExportJob& job) {
   const VoxelGrid& kind = voxel_grid(job);
   const ChargedVdb charged =
-      charge_vdb(job, kind, job.has_colors ? kind.open_vdb + kColorBytes : kind.open_vdb);
+      charge_vdb(job, kind, kind.has_colors(job) ? kind.open_vdb + kColorBytes : kind.open_vdb);
   const uint64_t voxels = charged.voxels;
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
-    const openvdb::GridBase::Ptr grid = kind.make(job, voxels);
+    const openvdb::GridBase::Ptr grid = kind.make(job, charged.steps);
     const uint64_t leaf_bytes = grid->constBaseTree().leafCount() * kVdbLeafBytes;
     uint64_t min_bytes = leaf_bytes + charged.leaf_voxels * kind.value_bytes;
     openvdb::GridPtrVec grids = {grid};
-    if (job.has_colors) {
+    if (kind.has_colors(job)) {
       grids.push_back(make_color_grid(job, voxels));
       // Half floats are precise enough to distinguish the linear values of all sRGB bytes.
       grids.back()->setSaveFloatAsHalf(true);
@@ -331,14 +328,14 @@ ExportReport write_vdb(const ExportJob& job) {
 ExportReport write_nvdb(const ExportJob& job) {
   const VoxelGrid& kind = voxel_grid(job);
   VdbNodeBytes both = kind.open_vdb + kind.nano_vdb;
-  if (job.has_colors) both = both + kColorBytes + kColorBytes;
+  if (kind.has_colors(job)) both = both + kColorBytes + kColorBytes;
   const ChargedVdb charged = charge_vdb(job, kind, both);
   const uint64_t voxels = charged.voxels;
   return with_vdb_errors(job, [&] {
     openvdb::initialize();
     std::vector<NanoGrid> grids;
-    grids.push_back(kind.make_nano(job, voxels));
-    if (job.has_colors) grids.push_back(nano_grid(*make_color_grid(job, voxels)));
+    grids.push_back(kind.make_nano(job, charged.steps));
+    if (kind.has_colors(job)) grids.push_back(nano_grid(*make_color_grid(job, voxels)));
     uint64_t bytes = 0;
     for (const auto& grid : grids) bytes += grid.size();
     return write_grid_file(job, voxels, bytes, [&](std::ostream& stream) {

@@ -73,7 +73,7 @@ TEST_F(RadiusOption, StartsAtTheSeed) {
                               "enclosed", "--radius", "2", "--seed", "16,16,16"});
   EXPECT_EQ(plan["solid"]["interior"]["likely"], sealed["solid"]["interior"]);
   EXPECT_EQ(run_json(seeded("1", "16,16,16"))["warnings"][0]["code"], "solid-reached");
-  expect_error(2, "farther from surfaces", seeded("2", "8,16,26.5"));
+  expect_error(2, "farther from surfaces", seeded("2", "8,16,27.5"));
 }
 
 TEST_F(RadiusOption, RefusedValues) {

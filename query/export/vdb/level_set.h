@@ -1,0 +1,104 @@
+// The grid `sdf` of .vdb and .nvdb files: a level set, which has the signed distance from each
+// voxel near the surface to the surface (query/export/level_set/narrow_band.h). Only vdb.cc
+// includes this file, after the headers of OpenVDB.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "core/base/error.h"
+#include "query/export/level_set/narrow_band.h"
+#include "query/export/vdb/vdb_grid.h"
+
+namespace voxdag::query {
+
+// Returns the half width of a level set's band, in voxels.
+inline int band_of(const ExportJob& job) { return job.options.band == 0 ? 3 : job.options.band; }
+
+// Like vdb_size(), for the tree of a level set. Does not count voxels.
+template <class Steps>
+VdbSize level_set_size(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
+                       uint64_t limit, Steps&& steps) {
+  VdbSize size;
+  std::set<Position> lower, upper;
+  const auto add_node = [&](std::set<Position>& known, const Position& low, int shift,
+                            uint64_t bytes) {
+    if (known.insert({low[0] >> shift, low[1] >> shift, low[2] >> shift}).second)
+      size.bytes += bytes;
+  };
+  const auto add_nodes = [&](const Position& low, int64_t edge) {
+    steps.advance(1);
+    if (edge < 128) add_node(lower, low, 7, node.lower);
+    if (edge < 4096) add_node(upper, low, 12, node.upper);
+    size.bytes += cells_of_cube(edge / 4096) * kRootTileBytes;
+    return size.bytes <= limit;
+  };
+  for_each_band_part(
+      job.dag, selection, band_of(job),
+      [&](const Position& low, const Position&, BandTile&) {
+        size.bytes += node.leaf;
+        ++size.leaves;
+        return add_nodes(low, kBandLeafEdge);
+      },
+      add_nodes);
+  return size;
+}
+
+// Returns the level set of the selected voxels. All values in a leaf, and the sign of all tiles,
+// are right. Throws Error{kInvalidInput} if the voxels are a surface without an inside.
+inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t leaves) {
+  const int width = band_of(job), limit = 4 * width * width;
+  const Region domain = band_domain(job.selection, width);
+  const auto background = static_cast<float>(width * job.cell_edge());
+  const auto grid = empty_vdb_grid<openvdb::FloatGrid>(job, "surface");
+  grid->setGridClass(openvdb::GRID_LEVEL_SET);
+  grid->setTree(std::make_shared<openvdb::FloatTree>(background));
+  std::vector<float> distances(static_cast<size_t>(limit) + 1);  // by the square
+  for (int i = 0; i <= limit; ++i)
+    distances[static_cast<size_t>(i)] = static_cast<float>(std::sqrt(i) / 2 * job.cell_edge());
+  // A set cell at least 1.5 cells from the surface: all 26 cells around it are set.
+  bool has_inside = false;
+  ExportStage stage(job, "build grid", leaves, "leaves");
+  openvdb::FloatGrid::Accessor accessor = grid->getAccessor();
+  BandSquares squares;
+  for_each_band_part(
+      job.dag, job.selection, width,
+      [&](const Position& low, const Position& at, BandTile& tile) {
+        tile.distances(at, squares);
+        auto* const leaf = accessor.touchLeaf(vdb_coord(low));
+        for (openvdb::Index i = 0; i < squares.size(); ++i) {
+          const int square = std::abs(squares[i]);
+          const float distance = distances[static_cast<size_t>(square)];
+          const openvdb::Coord offset = leaf->offsetToLocalCoord(i);
+          if (!domain.contains({low[0] + offset[0], low[1] + offset[1], low[2] + offset[2]}, 1))
+            continue;
+          leaf->setValueOnly(i, squares[i] < 0 ? -distance : distance);
+          leaf->setActiveState(i, square < limit);
+          has_inside = has_inside || squares[i] < -3;
+        }
+        stage.advance(1);
+        return true;
+      },
+      [&](const Position& low, int64_t edge) {
+        Region cube{low, {low[0] + edge, low[1] + edge, low[2] + edge}};
+        for (size_t a = 0; a < 3; ++a) {
+          cube.low[a] = std::max(cube.low[a], domain.low[a]);
+          cube.high[a] = std::min(cube.high[a], domain.high[a]) - 1;
+        }
+        grid->tree().sparseFill({vdb_coord(cube.low), vdb_coord(cube.high)}, -background, false);
+        has_inside = true;
+        return true;
+      });
+  if (!has_inside)
+    throw Error(ErrorCode::kInvalidInput,
+                job.file.path() +
+                    ": the voxels are a surface without an inside, so --grid sdf has no signs: "
+                    "expected a file of voxdag build --solid RULE, or --grid density");
+  return grid;
+}
+
+}  // namespace voxdag::query
