@@ -32,8 +32,8 @@ class ByteSink {
   std::vector<std::byte>& out_;
 };
 
-// Takes fields from the front of a buffer. If bytes are missing, the field is 0, and ok() is false
-// from then on.
+// Takes fields from the front of a buffer. If the buffer has too few bytes for a field, the field
+// is 0, and ok() is false from then on.
 class ByteSource {
  public:
   explicit ByteSource(std::span<const std::byte> bytes) : bytes_(bytes) {}

@@ -38,8 +38,8 @@ ArtifactIndex read_single_index(const ReadableFile& file, const ArtifactRef& ref
   return index;
 }
 
-// Returns the checksum of a footer's `fields` and of the key. So an entry that is stored under the
-// name of another key fails its checksum.
+// Returns the checksum of a cache entry's footer: of its `fields`, followed by the entry's key. So
+// an entry that is stored under the name of another key fails its checksum.
 uint64_t footer_checksum(std::span<const std::byte> fields, const std::string& key) {
   std::vector<std::byte> bytes(fields.begin(), fields.end());
   const auto digits = std::as_bytes(std::span(key));

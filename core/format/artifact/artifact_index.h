@@ -13,7 +13,7 @@
 
 namespace voxdag {
 
-// The version of segments and of artifacts.
+// The version of the format of segments and artifacts.
 inline constexpr uint32_t kSegmentVersion = 1;
 inline constexpr uint64_t kSegmentMagic = 0x0a47455347414456;  // "VDAGSEG\n"
 inline constexpr uint64_t kIndexMagic = 0x0a58444947414456;    // "VDAGIDX\n"
@@ -28,7 +28,7 @@ struct ArtifactIndex {
 // Maximum size of the index of an artifact: enough for 3 * 10^10 rows.
 inline constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
 // Throws Error{kCorrupt} if the index of the artifact at `ref` is larger than kMaxIndexBytes. Call
-// it before the index is read, because `ref` may come from a file that voxdag did not write.
+// this before allocating memory for the index, because `ref` may come from a damaged file.
 void check_index_bytes(const ArtifactRef& ref, const std::string& where);
 
 std::vector<std::byte> encode_index(const ArtifactIndex& index);

@@ -1,6 +1,6 @@
 // Reads one artifact. Immutable after construction: several threads may call read_frame(), each
-// with a different Frame. The index takes 56 bytes of memory per frame. This memory is not charged
-// to a budget.
+// with a different Frame. A reader keeps the artifact's index in memory: 56 bytes per frame, which
+// are not charged to a budget.
 #pragma once
 
 #include <cstdint>

@@ -12,11 +12,11 @@
 namespace voxdag {
 namespace {
 
-// zstd's level. With level 1, artifacts would be an eighth smaller and builds 5 % slower.
+// Compression level. With level 1, artifacts would be an eighth smaller, but builds 5 % slower.
 constexpr int kZstdLevel = -1;
 constexpr uint32_t kCompressedFlag = 0x80000000u;
-// When a column of a frame shrinks too little, the same column is not compressed in this many of
-// the following frames.
+// After compression has reduced a column of a frame by less than a quarter, the same column of this
+// many following frames is stored uncompressed, to save time.
 constexpr uint32_t kFramesToSkip = 15;
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
 
@@ -42,8 +42,8 @@ uint32_t plane_count(std::span<const uint32_t> children) {
   return all > 0xffffff ? 4 : all > 0xffff ? 3 : all > 0xff ? 2 : 1;
 }
 
-// Returns this thread's decompression context. Each thread has one, because several threads read
-// frames concurrently.
+// Returns this thread's decompression context. Several threads read frames concurrently, but zstd
+// cannot use one context in two threads at the same time.
 ZSTD_DCtx* decompression_context() {
   struct Deleter {
     void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }

@@ -36,7 +36,7 @@ class FrameEncoder {
   std::span<const std::byte> encode_nodes(const NodeLevelView& rows);
 
  private:
-  // Columns that may be compressed: the brick masks, the child masks, and the child planes 1 to 3.
+  // Columns that may be compressed: brick masks, child masks, and byte planes 1 to 3 of children.
   static constexpr size_t kColumns = 5;
   struct Context;
 

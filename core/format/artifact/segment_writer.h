@@ -19,7 +19,7 @@ namespace voxdag {
 // builds, and zstd's tables.
 inline constexpr uint64_t kSegmentWriterBytes = uint64_t{3} << 19;
 
-// Returns the path of the file: "segment-<id>.vdseg" in `folder`.
+// Returns the path of a segment: "segment-<id>.vdseg" in `folder`.
 std::string segment_path(const std::string& folder, uint32_t id);
 
 class FrameEncoder;
@@ -36,7 +36,7 @@ class SegmentWriter {
   void flush();
   // Flushes and frees the buffer. Nothing may be appended afterwards.
   void complete();
-  // Flushes. Returns after all bytes so far and the file's directory entry are on the disk.
+  // Flushes the buffer, and waits until all bytes and the file's directory entry are on the disk.
   void sync();
   // Syncs the bytes that were flushed before the call. Another thread may concurrently call any
   // function except sync() and sync_written(). After one failure, every later call fails, because

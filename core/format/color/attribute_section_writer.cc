@@ -12,8 +12,8 @@
 namespace voxdag {
 namespace {
 
-// A region of a coarser tier, and its contribution to its parent. The parent is the cell of the
-// next coarser tier that contains the region.
+// A region of a coarser tier (attribute_section_writer.h), and its contribution to the value of its
+// parent: the cell of the next coarser tier that contains the region.
 template <class Total>
 struct CoarseRegion {
   EncodedRegion region;

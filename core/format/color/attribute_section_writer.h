@@ -24,8 +24,9 @@ namespace voxdag {
 
 class AttributeSectionWriter {
  public:
-  // Encodes the colors of a region in a tier coarser than tier 0. The sum of a cell adds up the
-  // totals of the finer tier's regions that are inside the cell.
+  // Encodes the colors of region `morton` in a tier coarser than tier 0. `cells` are its cells of
+  // the tier's finest level. The sum of a cell adds up EncodedRegion::total of the next finer
+  // tier's regions that are inside the cell.
   using EncodeColors = std::function<EncodedRegion(uint32_t tier, uint64_t morton,
                                                    std::span<const ColoredCell> cells)>;
 
@@ -40,7 +41,7 @@ class AttributeSectionWriter {
 
   // Adds a region of tier 0: a cube of level max(cell_levels - 6, 0). Regions must come in
   // increasing Morton order. Throws Error{kCorrupt} for a region out of order or with inconsistent
-  // parts. Throws Error{kOutOfMemory} if the budget is too small.
+  // members. Throws Error{kOutOfMemory} if the budget is too small.
   void add_region(const EncodedRegion& region);
   // Writes the coarser tiers and ends the section. At least one region must have been added.
   void finish();

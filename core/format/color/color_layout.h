@@ -20,7 +20,7 @@ static_assert(kBlockBytes == kUnitBytes);
 // Offsets in an entry of a tier's directory, which has an entry for each region.
 inline constexpr size_t kRegionMortonAt = 0;
 inline constexpr size_t kRegionFirstUnitAt = 8;
-inline constexpr size_t kRegionCountsAt = 16;  // u32, u16, u16, u16, u8, u8, u8
+inline constexpr size_t kRegionCountsAt = 16;  // seven counts: u32, u16, u16, u16, u8, u8, u8
 inline constexpr size_t kRegionReservedAt = 29;
 inline constexpr size_t kRegionEntryBytes = 32;
 

@@ -1,6 +1,6 @@
-// Writes an attribute section after the levels of a global file: tiers of regions, and the tiers'
-// directories. All attributes use this class. docs/format.md, "The color section", documents the
-// byte layout.
+// Writes an attribute section after the levels of a global file: tiers of regions (defined in
+// attribute_section_writer.h), and the tiers' directories. All attributes use this class.
+// docs/format.md, "The color section", documents the byte layout.
 //
 // The regions of tier 0 are written to the file when they are added. The regions of the coarser
 // tiers and the directories are in memory until finish(), charged to the budget. Only one thread
@@ -33,7 +33,7 @@ class SectionWriter {
   uint32_t region_levels(uint32_t tier) const { return tiers_[tier].levels(); }
   uint64_t region_count(uint32_t tier) const { return tiers_[tier].regions; }
   // Adds a region. The regions of a tier must come in increasing Morton order. Throws
-  // Error{kCorrupt} for a region out of order or with inconsistent parts. Throws
+  // Error{kCorrupt} for a region out of order or with inconsistent members. Throws
   // Error{kOutOfMemory} if the budget is too small.
   void add(uint32_t tier, const EncodedRegion& region);
   // Writes the coarser tiers, the directories, `list` and the tier table, and ends the section.

@@ -1,5 +1,5 @@
-// Sums of colors that no scene can overflow. A ColorSum (64 bits) overflows after about 10^9 white
-// cells, and a cell near the root can contain that many.
+// A sum of colors in 128-bit integers, which never overflows. A ColorSum (color_sum.h, 64 bits)
+// overflows after about 10^9 white cells, and a cell near the root can contain that many.
 #pragma once
 
 #include <algorithm>
@@ -28,8 +28,8 @@ struct WideSum {
     weight += other.weight;
   }
 
-  // Returns the number of low bits that narrow() must drop so that the sum fits a ColorSum.
-  // Includes space for values that narrow() rounds up. Returns 0 if the sum already fits.
+  // Returns the number of low bits that narrow() must drop so that the sum fits a ColorSum; 0 if
+  // it already fits. Leaves one high bit free, because narrow() may round values up.
   int excess_bits() const {
     uint128 all = seen_weight | weight;
     for (size_t c = 0; c < 3; ++c) all |= seen[c] | plain[c];

@@ -38,7 +38,7 @@ class PlacedChecksums {
   explicit PlacedChecksums(uint64_t bytes) : bytes_(bytes) {}
 
   void add(uint64_t position, std::span<const std::byte> bytes);
-  // Returns the number of bytes that were not added yet.
+  // Returns the number of bytes that have not been added yet.
   uint64_t missing() const { return bytes_ - added_; }
   // Returns an object with the checksums of all bytes, to which more bytes can be added in order.
   // Requires missing() == 0.

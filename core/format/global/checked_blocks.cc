@@ -26,8 +26,9 @@ uint64_t CheckedBlocks::size_of(uint64_t block) const {
   return std::min(kBlockBytes, bytes_ - block * kBlockBytes);
 }
 
-// Compares the blocks that overlap `bytes` bytes from `place` (place_of()) with their stored
-// checksums. Bytes after the last block have no checksum and are ignored.
+// Compares the blocks that overlap [place, place + bytes) with their stored checksums, except
+// blocks that are known to be intact. `place` is a result of place_of(). Bytes after the last block
+// have no checksum and are ignored.
 void CheckedBlocks::compare_all(uint64_t place, uint64_t bytes) const {
   const uint64_t end = std::min(place + bytes, bytes_);
   for (uint64_t block = place / kBlockBytes; block * kBlockBytes < end; ++block)

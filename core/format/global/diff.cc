@@ -54,7 +54,7 @@ class PairTable {
   }
 
  private:
-  // Offsets are stored plus one. So an absent node is 0, and zeroed pages are free entries.
+  // Each offset is stored plus one. So 0 stands for kAbsent, and zeroed memory is a free entry.
   struct Entry {
     uint64_t a1 = 0, b1 = 0;
     DiffReport report;
@@ -124,8 +124,8 @@ class Differ {
     for (uint32_t level = 0; level < a.brick_level(); ++level) compared_.emplace_back(budget);
   }
 
-  // Divides the pairs of one level among the threads, which compare them and their subtrees. The
-  // levels above only add up these results.
+  // Finds a level with enough pairs. Divides these pairs among the threads; each thread compares
+  // the subtrees of its pairs. The levels above only add up the results.
   DiffReport run() {
     std::vector<NodePair> pairs{{a_.empty() ? kAbsent : 0, b_.empty() ? kAbsent : 0}};
     const NodePair root = pairs[0];
@@ -223,7 +223,7 @@ bool same_words(const voxdag_reader::Level& a, const voxdag_reader::Level& b, un
 }
 
 // True if all levels of the two files have equal words. Then the files have equal voxels. Files
-// with equal voxels and hash bits always have equal words.
+// with equal voxels, hash bits and node order always have equal words.
 bool same_words(const voxdag_reader::File& a, const voxdag_reader::File& b, unsigned threads,
                 const CancelToken& cancel) {
   for (uint32_t l = 0; l <= a.brick_level(); ++l)

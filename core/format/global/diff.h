@@ -26,7 +26,7 @@ void expect_same_grid(const voxdag_reader::File& a, const voxdag_reader::File& b
 
 // Counts the differing voxels on up to `threads` threads. Throws Error{kInvalidInput} if the
 // resolutions or bounds differ, Error{kCorrupt} for a damaged file. Needs 43 to 86 bytes of memory
-// per pair of nodes, charged to the budget.
+// per compared pair of nodes, charged to the budget.
 DiffReport diff_global_files(const voxdag_reader::File& a, const voxdag_reader::File& b,
                              unsigned threads, MemoryBudget& budget, const CancelToken& cancel);
 

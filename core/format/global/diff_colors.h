@@ -16,7 +16,7 @@ struct ColorDiff {
   uint64_t cells = 0;             // cells that are set in both files
   uint64_t different_cells = 0;   // cells whose colors differ
   uint32_t largest = 0;           // largest difference of a channel
-  uint64_t sum = 0, squares = 0;  // sums of the channels' differences and their squares
+  uint64_t sum = 0, squares = 0;  // sum of the channels' differences, sum of their squares
   // Adds a cell whose colors in the two files are `a` and `b`.
   void add(const voxdag_reader::Rgb& a, const voxdag_reader::Rgb& b);
   // Returns the mean difference of a channel; 0 if no cells were compared.

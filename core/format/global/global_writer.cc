@@ -74,7 +74,7 @@ struct GlobalFileWriter::State {
   std::vector<GlobalLevel> levels;     // complete levels, from the bricks upwards
   std::vector<Section> sections;       // complete sections
   BlockChecksums block_checksums;      // checksums of the complete and open levels and sections
-  uint64_t checksummed_words = 0;      // words of the open level in block_checksums
+  uint64_t checksummed_words = 0;      // words of the open level that block_checksums includes
   bool level_open = false;
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
@@ -382,8 +382,8 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   };
   add_expected(0, header.bytes());
   BlockChecksums read_back;
-  // The digest takes longer than reading and checksums. So with several threads, a background
-  // thread digests a chunk while the next chunk is read.
+  // Digesting a chunk takes longer than reading it and computing its checksums. So with several
+  // threads, a background thread digests a chunk while the next chunk is read.
   std::vector<std::byte> chunk, digested_chunk;
   std::future<void> digested;
   for (uint64_t at = kPageBytes; at < end; at += kReadBytes) {

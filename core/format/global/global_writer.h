@@ -92,15 +92,15 @@ class GlobalFileWriter {
   // may write the next levels concurrently.
   void sync();
 
-  // Sets the order in which the caller will write the nodes of each level. The header names it. The
-  // default is the order by hash.
+  // Sets the order in which the caller will write the nodes of each level. The file's header names
+  // this order. The default is the order by hash.
   void set_node_order(NodeOrder order);
 
   // Begins a level. Levels must come in the order L-2, L-3, ..., 0. A scene without voxels has no
   // levels.
   void begin_level(uint32_t level);
   // Adds the next words of the current level to the checksums without writing them. Call it for all
-  // words of the level, in order. Calls must not overlap.
+  // words of the level, in order. Two calls must not run concurrently.
   void checksum_words(std::span<const uint32_t> words);
   // Writes words [first, first + words.size()) of the current level. Disjoint ranges may be written
   // in any order and concurrently from several threads.
@@ -109,17 +109,17 @@ class GlobalFileWriter {
   // Error{kLimit}, whose message names the level, if the level has more than 2^40 words.
   void end_level(const GlobalLevel& level);
 
-  // Replaces begin_level() to end_level() for a caller that knows the sizes of all levels.
-  // place_levels() determines their offsets; `levels` begins with the bricks. Then write_placed()
-  // writes words of any level, each word once and in any order, and finish_placed() completes the
-  // levels. Such a file cannot be resumed.
+  // If the caller knows the sizes of all levels, these functions replace the four above.
+  // place_levels() determines the levels' offsets; `levels` begins with the bricks. Then
+  // write_placed() writes words of any level, each word once and in any order, and finish_placed()
+  // completes the levels. Such a file cannot be resumed.
   void place_levels(std::span<const GlobalLevel> levels);
   void write_placed(uint32_t level, uint64_t first, std::span<const uint32_t> words);
   void finish_placed();
 
-  // Attribute sections follow the levels, in increasing order of their kinds, if the scene has
-  // voxels. The bytes of a section are appended in order. A run that resumes writes the sections
-  // again.
+  // If the scene has voxels, attribute sections may follow the levels, in increasing order of their
+  // kinds. The bytes of a section are appended in order. A writer that resumes a file must write
+  // its sections again.
   void begin_section();
   void append(std::span<const std::byte> bytes);
   uint64_t section_bytes() const;  // bytes of the open section so far

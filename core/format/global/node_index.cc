@@ -8,8 +8,8 @@
 namespace voxdag {
 namespace {
 
-// A guessed beginning is accepted if this many consecutive nodes could follow from it. From a wrong
-// beginning there is practically never such a long chain. If there is, join() corrects the guess.
+// A word is accepted as the beginning of a node if this many valid nodes follow one another from
+// it. A wrong word almost never begins a chain of this length. If it does, join() corrects it.
 constexpr int kConvincingNodes = 32;
 
 }  // namespace
@@ -56,8 +56,8 @@ NodeIndex::Span NodeIndex::walk(uint64_t span, uint64_t begin) {
   return walked;
 }
 
-// Walks a span again if its guessed beginning is not the end of the previous span. Returns the
-// number of nodes of the level. Sets Words::before at the beginning of each span.
+// Walks each span again whose guessed beginning is not the end of the previous span's last node.
+// Returns the number of nodes of the level. Sets Words::before at the beginning of each span.
 uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
                          const std::string& where) {
   uint64_t nodes = 0, at = 0;

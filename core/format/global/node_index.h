@@ -1,8 +1,8 @@
 // Finds the word offsets at which the nodes of a level of the global file begin. Nodes vary in
 // size, so this requires a walk over the level from its first word. To use several threads, the
 // level is cut into spans. Each span but the first is walked from a word that looks like the
-// beginning of a node. If the previous span turns out not to end at this word, the span is walked
-// again.
+// beginning of a node. If the last node of the previous span does not end at this word, the span is
+// walked again.
 #pragma once
 
 #include <algorithm>

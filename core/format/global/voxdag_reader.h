@@ -115,8 +115,8 @@ class File {
   // messages contain `name`.
   File(const void* data, uint64_t size, const std::string& name = "memory")
       : File(name, std::make_shared<const Bytes>(data, size)) {}
-  // Opens a file with the given bytes, for programs that use the Bytes object before, for example
-  // to prepare its mapping. Error messages contain `path`.
+  // Opens a file whose Bytes the program has created itself, for example to prepare the mapping
+  // before this constructor reads it. Error messages contain `path`.
   File(const std::string& path, std::shared_ptr<const Bytes> bytes)
       : path_(path), bytes_(std::move(bytes)) {
     read_header();
@@ -139,8 +139,8 @@ class File {
   uint32_t brick_level() const { return grid_levels_ - 2; }
   // Returns the version of the format: 1, or 2 if the file has wide levels or attributes.
   uint32_t version() const { return version_; }
-  // Return the bits of the node hash, 4 to 64, and the order of the nodes in each level: 1 means by
-  // hash, 2 means by first parent.
+  // Return the number of bits of the node hash (4 to 64), and the order of the nodes in each level:
+  // 1 is the order by hash, 2 is the order by first parent.
   uint32_t hash_bits() const { return hash_bits_; }
   uint32_t node_order() const { return get<uint32_t>(data() + 24); }
   // Return the numbers of set voxels, of nodes of the octree that the DAG represents, and of nodes

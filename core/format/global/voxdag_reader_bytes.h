@@ -1,5 +1,5 @@
-// The part of voxdag_reader.h that maps or reads files and reports errors. Copy the three headers
-// into your engine, and include voxdag_reader.h.
+// The part of voxdag_reader.h that maps or reads files and reports errors. Copy all three
+// voxdag_reader headers into your engine, and include voxdag_reader.h.
 #pragma once
 
 #ifdef _WIN32

@@ -1,6 +1,7 @@
 // The part of voxdag_reader.h that reads colors and the other attributes of cells (alpha, normals,
-// materials). Copy the three headers into your engine, and include voxdag_reader.h. docs/format.md
-// describes the bytes in "The color section" and "The sections of alpha, normals and materials".
+// materials). Copy all three voxdag_reader headers into your engine, and include voxdag_reader.h.
+// docs/format.md, "The color section" and "The sections of alpha, normals and materials", describes
+// the bytes.
 //
 // A section has a color, or another value, for all set cells of the levels from 0 to the section's
 // finest level. The levels are divided into tiers of up to seven levels, and a tier into regions of
@@ -360,7 +361,7 @@ class BasicColorCursor {
       if (there >> i & 1) cells += count(level + 1, child(level, place, i), target);
     return cells;
   }
-  // Returns the index of the child of path_[level] that is on the path.
+  // Returns the child index (0 to 7) of the cell that follows path_[level] on the path.
   unsigned step(uint32_t level) const {
     return static_cast<unsigned>(path_code_ >> 3 * (depth_ - level - 1) & 7);
   }
@@ -392,10 +393,10 @@ class BasicColorCursor {
   }
 
   // Makes region_ the region of a cell on the path, and returns the index of the cell's value in
-  // the region. For this, the cursor remembers a *group*: the cells of one level in the cube
-  // `above` levels above them (at most three). For each parent of the group's cells, masks_ has the
-  // mask of its children, and starts_ the number of cells of the group's level that come before
-  // these children in the region.
+  // the region. To do this fast, the cursor remembers a *group*: the cells of one level in a cube
+  // that is `above` levels coarser (at most three). For each parent of the group's cells, masks_
+  // has the mask of the parent's children, and starts_ has the number of cells of the group's level
+  // that come before these children in the region.
   uint64_t stored_index(uint32_t level, uint64_t code) {
     const ColorTier& tier = section_->tier_of(level);
     // Number of levels from the cell up to the group's cube.
@@ -474,7 +475,7 @@ class BasicColorCursor {
   // The current group; see stored_index().
   uint32_t group_level_ = kNone;  // level of the group's cells
   uint64_t group_code_ = 0;       // Morton code of the group's cube
-  uint64_t starts_[64] = {};      // by parent: rank of its first child in the region
+  uint64_t starts_[64] = {};      // by parent: number of the level's cells before its first child
   uint32_t masks_[64] = {};       // by parent: mask of its children
 };
 

@@ -15,8 +15,8 @@ class WatchedFile {
   explicit WatchedFile(const voxdag_reader::File& file)
       : file_(file), mapping_(file.data(), file.file_bytes()) {}
 
-  // Throws Error{kIo} if a part of the file could not be read since this object was created.
-  // Results made from the file must then be discarded.
+  // Throws Error{kIo} if a read of the file has failed since this object was created. The caller
+  // must then discard all results computed from the file.
   void check_readable() const {
     if (mapping_.is_damaged())
       throw Error(ErrorCode::kIo,

@@ -156,8 +156,8 @@ class ColorVerifier {
                  std::to_string(region.blocks[at]));
   }
 
-  // Checks the values of a region; not for colors. `cells` are the region's cells of the finest
-  // level, without their values.
+  // Checks the values of a region of an attribute other than colors. `cells` are the region's cells
+  // of the finest level. Sets their values.
   void check_values(const ColorTier& tier, uint64_t i, const ColorRegion& region,
                     std::vector<ValuedCell>& cells) const {
     const auto fail_at = [&](size_t at, const std::string& what) {
