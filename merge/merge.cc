@@ -12,7 +12,7 @@ namespace voxdag {
 namespace {
 
 // Maximum total rows of artifacts that a pass merges into one artifact. The total bounds the rows
-// of each merged level, and the format allows at most 2^32 of them.
+// of each merged level, and the format allows at most 2^32 rows per level.
 constexpr uint64_t kMaxArtifactRows = uint64_t{1} << 32;
 
 // Runs merge passes until one more pass can merge all artifacts. This last pass writes the global

@@ -32,9 +32,9 @@
 
 namespace voxdag {
 
-// Merges all levels into `out`, without sealing it. Scratch files use `files`. If `checkpoint` is
-// not null, saves the merge's state there, and resumes a state that an interrupted merge saved. A
-// state of other inputs is discarded with a warning, and the merge starts over. Throws Error.
+// Merges all levels into `out`, without sealing it. Writes scratch files through `files`. If
+// `checkpoint` is not null, saves the merge's state there, and resumes the state of an interrupted
+// merge. Discards a state of other inputs with a warning, and starts over. Throws Error.
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint = nullptr);

@@ -152,7 +152,7 @@ std::vector<SegmentRange> MergeRecovery::newly_merged(std::span<const ArtifactRe
   for (size_t i = 0; i < readers.size(); ++i) {
     const ArtifactRef& ref = pending_.artifacts()[i].ref;
     if (is_pass_segment(ref.segment)) continue;
-    // An artifact stores its levels one after another, bricks first.
+    // An artifact stores its levels one after another, bricks first. So `level` ends at `end`.
     uint64_t end = ref.offset;
     for (const ArtifactLevel& l : readers[i].levels())
       if (l.level >= level && !l.frames.empty())

@@ -54,12 +54,12 @@ class MergeRecovery {
   PassProgress resume(const MergeState& state, GlobalFileWriter& out);
   PassProgress resume_final_pass(const FinalPassState& state, GlobalFileWriter& out);
   MergeState make_state(std::vector<ArtifactRef> intermediates) const;
-  // Returns the intermediates (outputs of earlier passes) among the pending artifacts from index
-  // `begin` on.
+  // Returns the intermediates (outputs of earlier passes) among the artifacts of pending_, from
+  // index `begin` on.
   std::vector<ArtifactRef> intermediates_from(size_t begin) const;
-  // For each input, returns the range of its segment that contains the frames of the levels from
-  // the bricks up to `level`. Omits the part that earlier calls returned, and ranges that are still
-  // shorter than kMinReleasedBytes.
+  // For each artifact of pending_ that is an input of the merge, returns the range of its segment
+  // that contains the frames of the levels from the bricks up to `level`. Omits bytes that earlier
+  // calls have returned, and ranges that are still shorter than kMinReleasedBytes.
   std::vector<SegmentRange> newly_merged(std::span<const ArtifactReader> readers, uint32_t level);
 
   const MergeContext& context_;

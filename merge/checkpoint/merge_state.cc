@@ -127,8 +127,8 @@ class Get : public Coder<Get> {
     word = in_.get<T>();
   }
   // Reads a count and resizes `items` to it. Each item takes at least `min_bytes` of the input, so
-  // a count is damaged if it exceeds the number of items for which bytes are left. Such a count
-  // never allocates memory.
+  // a count is damaged if it exceeds the number of items for which bytes are left. For such a
+  // count, no memory is allocated.
   void count(auto& items, size_t min_bytes) {
     const uint64_t n = in_.get<uint64_t>();
     if (n <= in_.left() / min_bytes)

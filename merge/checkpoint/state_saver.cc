@@ -49,7 +49,8 @@ void StateSaver::save(uint32_t level, MergeState state,
     for (const SegmentRange& range : merged)
       if (!finishing_) checkpoint_->release(range);
   });
-  // An interval of 0, for tests, saves a state after every level.
+  // Tests set the interval to 0 to save a state after every level. During a save, is_due() would
+  // return false, so this call waits.
   if (interval_s_ == 0) wait();
 }
 

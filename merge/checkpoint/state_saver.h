@@ -38,8 +38,8 @@ class StateSaver {
   // Discards the durable state and its files.
   void forget();
 
-  // True if the last save has finished and enough CPU time has passed since it began. Rethrows the
-  // exception of that save.
+  // True if the last save has finished, and the process has used `interval_s` seconds of CPU time
+  // since that save began. Rethrows the exception of that save.
   bool is_due();
   // Saves a state in the background, with `level` as in Checkpoint::save(). `named` are the scratch
   // files that the state names. `sync` is called first and makes these files and the output

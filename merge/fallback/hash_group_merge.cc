@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint32_t kMaxEncodedWords = 1 + kMaxRowWords;  // a row in the scratch file: mask, words
 
-// The rows of one run that are in the group, which has all rows with one hash.
+// The rows of one run (merge/load/row.h) that belong to the group of all rows with one hash.
 struct GroupRun {
   size_t run = 0;
   uint64_t first_row = 0;  // first row of the group in the run
@@ -23,7 +23,7 @@ class GroupFile {
   GroupFile(const MergeContext& context, const LevelTask& task, uint64_t hash, uint64_t bytes)
       : context_(context), task_(task), hash_(hash), bytes_(bytes), file_(context.scratch) {}
 
-  // Writes the group's rows of all runs to the file. Their children are replaced by positions.
+  // Writes the group's rows of all runs to the file, with positions instead of child indices.
   void fill() {
     PageBuffer<uint32_t> buffer(context_.budget, kBufferWords, "rows of a group of equal hashes");
     buffer_ = std::move(buffer);
@@ -94,7 +94,7 @@ class GroupFile {
   size_t buffered_ = 0;
 };
 
-// Reads the group's rows of one run through a buffer, and stores the positions of these rows.
+// Reads the rows of a GroupRun through a buffer, and stores the rows' positions in PositionMaps.
 class GroupCursor {
  public:
   GroupCursor(const ScratchFile& file, const GroupRun& run, const RowFormat& format, uint64_t hash,
@@ -166,8 +166,8 @@ LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task,
   const auto runs = group.runs();
 
   OrderedRowWriter out(task.output, task.format, first_position, context.budget);
-  // Words in each run's buffer: a quarter for positions, the other words for rows. It is a multiple
-  // of 8, so that the quarter has an even number of words and no position of two words is cut.
+  // Words in each run's buffer: a quarter for positions, the other words for rows. The number is a
+  // multiple of 8. So the quarter has an even number of words, and no two-word position is cut.
   const size_t each =
       std::clamp<uint64_t>(bytes / 2 / sizeof(uint32_t) / runs.size(), 128, 16384) / 8 * 8;
   PageBuffer<uint32_t> buffers(context.budget, each * runs.size() + kMaxRowWords,

@@ -12,7 +12,7 @@
 namespace voxdag {
 
 // Merges all rows whose hash is `hash`, and returns the size of the merged rows. The first unique
-// row gets the position `first_position`. Uses at most `bytes` of the budget.
+// row gets the position (merge/load/row.h) `first_position`. Uses at most `bytes` of the budget.
 LevelExtent merge_hash_group(const MergeContext& context, const LevelTask& task, uint64_t hash,
                              uint64_t first_position, uint64_t bytes);
 

@@ -18,7 +18,7 @@ namespace voxdag {
 // LevelOutput.
 class OrderedRowWriter {
  public:
-  // The first row gets the position `first_position`.
+  // The first row gets the position (merge/load/row.h) `first_position` in the merged level.
   OrderedRowWriter(LevelOutput& output, const RowFormat& format, uint64_t first_position,
                    MemoryBudget& budget)
       : output_(output),

@@ -6,9 +6,9 @@
 namespace voxdag {
 namespace {
 
-// Returns b, for buckets that cover 2^b hashes each. If the hashes are spread evenly, a bucket has
-// about `bucket_rows` rows. With many slices, a bucket has more rows, so that the table of bucket
-// begins (one entry per bucket and slice) takes at most about four bytes per row.
+// Returns b, for buckets (hash_partition.h) that cover 2^b hashes each. If the hashes are spread
+// evenly, a bucket has about `bucket_rows` rows. With many slices, a bucket has more rows, so that
+// bucket_begins_ (one entry per bucket and slice) takes at most about four bytes per row.
 unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_t bucket_rows,
                             size_t slices) {
   const uint64_t max_buckets = std::max<uint64_t>(

@@ -68,7 +68,7 @@ struct PartitionWorkers {
 
 // An upper bound of the memory of a Frame with kFrameRows rows.
 inline constexpr uint64_t kFrameMemoryBytes = uint64_t{640} << 10;
-// Maximum bytes of a partition, so that the number of its words has at most 32 bits.
+// Maximum size of a partition in bytes, chosen so that the number of its words fits in 32 bits.
 inline constexpr uint64_t kMaxPartitionBytes = uint64_t{8} << 30;
 
 class HashPartition {

@@ -27,15 +27,15 @@ class LevelRun {
  public:
   virtual ~LevelRun() = default;
   // Decodes a frame. Several threads may call it concurrently, each with a separate `out`. A child
-  // is a row index in the next deeper level of the same artifact, or a position if is_rewired().
+  // is a row index in the artifact's next deeper level; if is_rewired(), a position (row.h).
   virtual void read_frame(size_t index, Frame& out) const = 0;
 
   std::span<const FrameInfo> frames() const { return frames_; }
   uint64_t rows() const { return rows_; }
   const RowFormat& format() const { return format_; }
   bool bricks() const { return format_.bricks; }
-  // True if children are positions; otherwise they are row indices in the artifact's next deeper
-  // level.
+  // True if children are positions (row.h); otherwise they are row indices in the artifact's next
+  // deeper level.
   bool is_rewired() const { return rewired_; }
 
   // Returns the number of rows before frame `index`, which may be one past the last frame.

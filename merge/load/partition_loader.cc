@@ -14,9 +14,9 @@ namespace {
 constexpr size_t kFramesPerItem = 16;
 
 // Replaces row indices by positions: writes map[child] to `out` for each of `children`, as two
-// words if `wide` is set. `map` may have two words per position although `wide` is false. The width
-// of a map is chosen before its level is merged, for the case that no rows are equal; `wide` is
-// chosen afterwards, for the merged level.
+// words if `wide` is set. `map` may have two words per position although `wide` is false: its width
+// is chosen before its level is merged, for the maximum size of the merged level. `wide` is chosen
+// afterwards, for the actual size.
 void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,
                  uint32_t* out) {
   if (!wide_map) {
@@ -53,8 +53,8 @@ class HashPartition::Loader {
   }
 
   // Returns the work items: consecutive frames of one slice each. slice_of_item[i] is the index of
-  // the slice of item i. If the position maps are spilled, an item has all frames of its slice, so
-  // that the slice's map is loaded only once.
+  // the slice of item i. If the position maps are in a scratch file, an item has all frames of its
+  // slice, so that the map of the slice's run is loaded only once.
   std::vector<FrameSpan> items(std::vector<size_t>& slice_of_item) const {
     std::vector<FrameSpan> spans;
     for (size_t s = 0; s < partition_.slices_.size(); ++s) {
@@ -139,9 +139,9 @@ class HashPartition::Loader {
     return (hash >> partition_.bucket_bits_) - (interval.first >> partition_.bucket_bits_) + 1;
   }
 
-  // Sets the begins of the buckets whose lowest hash is above the first hash of this frame but not
-  // above the first hash of the next frame. The slice's first frame also sets the begins of all
-  // earlier buckets, and its last frame the begins of all later buckets.
+  // Sets bucket_begins_ for the buckets whose lowest hash is above the first hash of this frame but
+  // not above the first hash of the next frame. The call for the slice's first frame also sets it
+  // for all earlier buckets, and the call for the last frame for all later buckets.
   void mark_bucket_begins(size_t slice_index, const LevelRun& run, size_t f, const Frame& frame) {
     const RunSlice& slice = partition_.slices_[slice_index];
     size_t next = f == slice.frames.begin ? 0 : begins_up_to(frame.hashes.front());
@@ -171,8 +171,8 @@ class HashPartition::Loader {
                                              : hash > partition_.interval_.last;
   }
 
-  // Replaces the children of a slice whose position map is larger than the worker's memory. Loads
-  // the map window by window, and for each window replaces the children with positions in it.
+  // Replaces the children of a slice if its run's position map is larger than the worker's memory.
+  // Loads the map window by window, and replaces the children whose positions are in the window.
   void replace_by_windows(Worker& worker, const RunSlice& slice, const CancelToken& cancel) {
     const bool wide = partition_.format().wide;
     const uint64_t children = slice.size.words >> wide;

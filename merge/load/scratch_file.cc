@@ -21,7 +21,7 @@ ScratchPath::~ScratchPath() {
   try {
     folder_.files().remove(path());
   } catch (const Error&) {
-    // The next merge in this folder removes the file.
+    // This error is ignored, because the next merge in this folder removes the file.
   }
 }
 

@@ -1,6 +1,6 @@
 // A run with one level of the top tree: nodes whose children are roots of subvolumes or other top
-// nodes. The merge treats it like the runs of the artifacts, but its children are already
-// positions.
+// nodes. The merge treats it like the runs of the artifacts, except that its children are already
+// positions (row.h).
 #pragma once
 
 #include <cstdint>

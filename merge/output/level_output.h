@@ -13,8 +13,8 @@
 
 namespace voxdag {
 
-// The size of a merged level, or of a part of it. Positions count words in the global file, and
-// rows in an artifact.
+// The size of a merged level, or of a part of it. Positions (merge/load/row.h) count words in the
+// global file, and rows in an artifact.
 struct LevelExtent {
   uint64_t nodes = 0;
   uint64_t positions = 0;

@@ -20,7 +20,7 @@ constexpr uint64_t kBucketRows = 8192;
 // so that a bucket has several adjacent rows of each run.
 constexpr uint64_t kMinBucketRowsPerRun = 16;
 
-// Walks the rows of one slice within one bucket.
+// Walks the rows of one slice (hash_partition.h) within one bucket.
 class SliceCursor {
  public:
   SliceCursor(const HashPartition& partition, size_t slice, size_t bucket) : partition_(partition) {

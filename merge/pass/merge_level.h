@@ -12,7 +12,7 @@ namespace voxdag {
 uint64_t bytes_for_workers(const MergeMemory& plan);
 
 // Merges the level of `task`, and returns the size of the merged level. Adds the numbers of hash
-// partitions, streamed groups and rows to the merge's report.
+// partitions, streamed groups and rows (MergeReport) to the merge's report.
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task);
 
 }  // namespace voxdag

@@ -79,15 +79,15 @@ class Pass {
       memory_.release();
   }
 
-  // Returns the positions that `rows` take in the output if no two of them are equal, which is the
-  // maximum.
+  // Returns the maximum number of positions (merge/load/row.h) that `rows` can take in the output:
+  // the number if no two rows are equal.
   uint64_t max_positions(const RowCount& rows) const {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
-  // Allocates the memory for hash partitions in one step, for the largest level in one partition,
-  // if the budget allows it. Otherwise every partition that is larger than all before it allocates
-  // new memory.
+  // If the budget has enough memory for a hash partition of all rows of the largest level,
+  // allocates it now, and all partitions use it. Otherwise a partition allocates new memory if it
+  // is larger than all earlier partitions.
   void reserve_memory() {
     std::vector<RowCount> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
@@ -104,8 +104,8 @@ class Pass {
       memory_.reserve(max, 0, context_.budget);
   }
 
-  // Returns the bytes for merging a level in addition to the partition: the workers' memory and one
-  // level's position maps.
+  // Returns the bytes that merging a level needs in addition to the hash partition: the workers'
+  // memory and one level's position maps.
   uint64_t bytes_besides_partition() const {
     return bytes_for_workers(context_.plan) + context_.plan.resident_bytes;
   }

@@ -37,8 +37,8 @@ struct MergeMemory {
     return plan;
   }
 
-  // Returns the hash partition's part of the free memory. The rest is for the partition's bucket
-  // begins and for the artifacts' indexes.
+  // Returns the hash partition's part of the free memory. The rest is for the partition's table of
+  // bucket begins (HashPartition::bucket_begin()) and for the artifacts' indexes.
   static uint64_t partition_bytes_within(uint64_t free_bytes) {
     return free_bytes - free_bytes / 16;
   }

@@ -120,7 +120,7 @@ bool BucketSorter::same_row(const Entry& a, const Entry& b) const {
 }
 
 // Collects the unique rows and the position of every row. Usually all rows with the same hash are
-// equal: one row, or copies from several runs. Only if they are not, they are sorted.
+// equal: one row, or copies from several runs. Otherwise, the rows with this hash are sorted.
 void BucketSorter::emit_unique(bool in_words) {
   unique_.clear();
   extent_ = 0;

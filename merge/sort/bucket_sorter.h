@@ -19,7 +19,7 @@ namespace voxdag {
 
 class BucketSorter {
  public:
-  // Maximum rows of a bucket for sort().
+  // Maximum number of rows in a bucket that sort() can sort.
   static constexpr uint64_t kMaxRows = uint64_t{1} << 20;
 
   // Creates a sorter for buckets of up to `max` rows.

@@ -13,9 +13,9 @@ namespace voxdag {
 
 // Stores the state of an unfinished merge, so that the merge can be resumed.
 //
-// A state has a few hundred KB, which only the merge interprets. It names files of the scratch
-// folder and the partial global file, all of which are synced before save(). It identifies the
-// inputs by their content, so the merge can resume from it even if an artifact was built again.
+// A state consists of a few hundred KB that only the merge interprets. It names files of the
+// scratch folder and the partial global file, all of which are synced before save(). It identifies
+// the inputs by their content, so the merge can resume even if an artifact was built again.
 // Background threads call save() and release(), never concurrently.
 class Checkpoint {
  public:
