@@ -212,8 +212,8 @@ voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts) {
     known.svo_nodes = dag.svo_nodes();
     known.dag_nodes = dag.dag_nodes();
     known.bytes = dag.file_bytes();
-    // If the caller's header is newer than this library, the caller's struct has additional
-    // members. They are set to 0.
+    // If the caller's header is newer than this library, the caller's struct has members that
+    // this library does not know. This call sets them to 0.
     std::memset(facts, 0, known.struct_size);
     std::memcpy(facts, &known, std::min(known.struct_size, sizeof known));
   });

@@ -26,9 +26,9 @@
 namespace voxdag::query {
 namespace {
 
-// Divisors of the memory limit. They give the memory of one list, one sorter, the values of one
-// level, and one window of lookups (node_values.h). There are up to nine lists for each level, and
-// up to six sorters and four levels of values at any time.
+// Divisors of the memory limit. The quotients are the memory of one list, one sorter (spill.h), the
+// values of one level, and one window of lookups (node_values.h). There are up to nine lists for
+// each level, and up to six sorters and four levels of values at any time.
 constexpr uint64_t kListShare = 1024;
 constexpr uint64_t kSorterShare = 32;
 constexpr uint64_t kValueShare = 10;
@@ -56,7 +56,7 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
   if (!is_moved) refuse_other_order(b);  // a moved file is sorted again
 }
 
-// The folder of the temporary files of one combine() or cut(), and the memory for its data.
+// The temporary folder of one combine() or cut(), its memory budget, and the budget's shares.
 struct Workspace {
   Workspace(const CombineSpec& combine_spec, FileSystem& file_system)
       : spec(combine_spec),

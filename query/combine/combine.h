@@ -10,10 +10,10 @@
 //
 // pair_levels.h works from the root down to the bricks, the others from the bricks up to the root.
 //
-// The time depends on the sizes of the files and on the number of distinct pairs. The memory is
-// limited by the budget: lists that exceed their share, and the values of large levels, are stored
-// in a scratch folder. Only the marks of kept and counted nodes (pair_levels.h) must be in memory.
-// They take one bit for each two words of two consecutive levels.
+// The time depends on the sizes of the files and on the number of distinct pairs of cubes. The
+// memory is limited by the budget: lists that exceed their share, and the values (node_values.h) of
+// large levels, are stored in a scratch folder. Only the marks of kept and counted nodes
+// (pair_levels.h) must be in memory: one bit for each two words of two consecutive levels.
 #pragma once
 
 #include <array>

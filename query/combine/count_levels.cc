@@ -6,8 +6,8 @@
 
 namespace voxdag::query {
 
-// Called before the next coarser level. Computes the change of the counts of each of its pairs: the
-// sum of the changes of the pair's places.
+// Called between two levels. For each pair of the next coarser level, computes the change of its
+// counts: the sum of the changes of the pair's places (result_rows.h).
 void CountLevels::sum_pairs() {
   auto sums = std::make_unique<SpillList<KeyedCounts>>(space_);
   places_->finish();

@@ -22,7 +22,8 @@ namespace voxdag::query {
 
 class CountLevels {
  public:
-  // `bricks` has, for each pair of bricks, the change of the counts relative to the reference file.
+  // `bricks` has, for each pair of bricks, the change of the numbers of voxels and octree nodes
+  // relative to `reference`.
   CountLevels(DagInput& a, DagInput& b, Outcome reference, const SpillList<KeyedCounts>& bricks,
               const SpillSpace& space, const LookupMemory& memory)
       : a_(a),
@@ -32,8 +33,8 @@ class CountLevels {
         memory_(memory),
         pair_changes_(&bricks) {}
 
-  // Call these functions in this order for each level, from the bricks up. Call add_pair() for each
-  // place whose result is the result of a pair, by increasing numbers of the pairs.
+  // For each level, from the bricks up, call these three functions in this order. Call add_pair()
+  // for each place (result_rows.h) whose result is the result of a pair, by increasing pair number.
   void begin_level();
   // Adds the change of the counts of use.place, whose result is the result of use.pair. `has_node`
   // is false if this result is empty.

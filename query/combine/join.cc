@@ -10,12 +10,12 @@
 
 namespace voxdag::query {
 
-// A node of the first file.
+// The hash of a node of the first file.
 struct HashOfA {
   uint64_t hash = 0;
 };
-// The hash of a node of the second file. `number_in_a` is 1 plus the offset of the equal node of
-// the first file, or 0 if the first file has no such node.
+// The hash of a node of the second file. `number_in_a` is 1 plus the word offset of the equal node
+// of the first file, or 0 if the first file has no such node.
 struct HashOfB {
   uint64_t hash = 0;
   uint64_t number_in_a = 0;
@@ -47,11 +47,11 @@ class HashCursor {
   uint64_t offset() const { return cursor_.offset(); }
   uint64_t hash() const { return own().hash; }
   bool is_full() const { return is_full_; }
-  // True if all children of the node exist in the first file. Otherwise the first file cannot have
-  // the node.
+  // True if the first file has an equal node for each child of the node. Otherwise the first file
+  // cannot have a node equal to this one.
   bool is_comparable() const { return is_comparable_; }
-  // Returns the node with the offsets that its children have in the first file. Requires
-  // is_comparable().
+  // Returns the node as a Row (result_rows.h) with the offsets that its children have in the first
+  // file. Requires is_comparable().
   const Row& row() const { return kIsA ? own() : joined_; }
   void next() {
     has_previous_ = true;

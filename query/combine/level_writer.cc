@@ -175,8 +175,8 @@ void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   children_.reset();
 }
 
-// Adds the result, and the change of the counts, of each place whose result is the result of a
-// pair. `results` has the results of the pairs of this level.
+// Adds the result of each place (result_rows.h) whose result is the result of a pair of this level
+// to children_, and the change of the place's counts to counts_. `results` has the pairs' results.
 void LevelsWriter::add_pair_results(const SpillList<PairUse>& uses,
                                     SpillSorter<KeyedNode>& results) {
   results.finish();

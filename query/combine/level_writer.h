@@ -42,7 +42,7 @@ class LevelsWriter {
   const LookupMemory memory_;
   CountLevels& counts_;
   GlobalFileWriter& out_;
-  // The results of the places in the level that is written next.
+  // The results of the places (result_rows.h) from which the next level's rows are made.
   std::unique_ptr<SpillSorter<KeyedNode>> children_;
   std::unique_ptr<Below> below_;  // the level written last
   uint64_t dag_nodes_ = 0;

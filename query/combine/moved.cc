@@ -16,8 +16,8 @@ constexpr int64_t axis_bit(size_t index, size_t axis) {
 
 }  // namespace
 
-// Returns the word offset of a cube of the input. `index` is its position, counted in cubes as
-// large as the new grid. Returns kNoNode if the cube is empty or outside the input's grid.
+// Returns the word offset of a cube of the input that has the edge of the new grid. `index` is its
+// position, in units of this edge. Returns kNoNode for an empty cube or outside the input's grid.
 uint64_t MovedLevels::cube_at(const std::array<int64_t, 3>& index) const {
   const int64_t depth = std::max<int64_t>(input_level(0), 0);
   for (const int64_t i : index)
@@ -63,8 +63,8 @@ void MovedLevels::add(Open& to, const Cubes& cubes, uint64_t place) const {
     if (cube != kNoNode) return to.requests->add({cubes, place});
 }
 
-// Sorts the requests of a level to find its distinct groups, and numbers these groups. Stores the
-// number of the group for each requesting place.
+// Sorts the requests of a level to find its distinct groups (moved.h), and numbers these groups.
+// Stores the number of the group for each place (result_rows.h) that requests it.
 void MovedLevels::number_groups(Open& level) const {
   SpillSorter<Request>& requests = *level.requests;
   requests.finish();

@@ -1,10 +1,10 @@
 // Moves a file by a whole number of voxels into the grid of another file.
 //
 // A cube of the new file overlaps up to 2 x 2 x 2 cubes of the moved file that have the same edge.
-// These cubes are the *group* of the new cube. On each level, the position of a cube relative to
-// its group is the same everywhere, so cubes with equal groups have equal contents. So the distinct
-// groups are found level by level, from the root down, and each group is divided only once. On an
-// axis on which the offset is a multiple of the cubes' edge, a group has only one cube.
+// These cubes are the *group* of the new cube. On each level, all new cubes have the same position
+// relative to their groups, so new cubes with equal groups have equal contents. Therefore
+// MovedLevels finds the distinct groups level by level, from the root down, and divides each only
+// once. On an axis on which the offset is a multiple of the cubes' edge, a group has only one cube.
 #pragma once
 
 #include <array>
@@ -29,8 +29,8 @@ class MovedLevels {
               uint32_t hash_bits, const SpillSpace& space)
       : input_(input), levels_(levels), offset_(offset), hash_bits_(hash_bits), space_(space) {}
 
-  // Descends from the root to the bricks. Returns the places that use each group, by level; index 0
-  // is the root's level. Adds the new bricks to `bricks`.
+  // Descends from the root to the bricks. Returns the places (result_rows.h) that use each group,
+  // by level; index 0 is the root's level. Adds the new bricks to `bricks`.
   std::vector<std::unique_ptr<PairLevel>> descend(BrickResults& bricks);
 
  private:

@@ -101,7 +101,8 @@ class NodeValues {
   std::optional<SpillList<Entry>> list_;
 };
 
-// Looks up many values in the three passes described above. `Values` is a class like NodeValues.
+// Looks up many values in the three passes that the top of this file describes. `Values` is a class
+// like NodeValues.
 template <class Values>
 class NodeLookups {
  public:
@@ -140,8 +141,8 @@ class NodeLookups {
     if (offset >= values_.level_words()) return Values::nothing();
     return Values::found(offset, answers_->next(offset / 2 / window_slots_));
   }
-  // Prefetches the values at these words, which are probably pointers in nodes that are visited
-  // soon.
+  // Uses each of these words as a word offset, and prefetches the value at this offset. Most of
+  // them are pointers in nodes that will be visited soon.
   void prefetch(std::span<const uint32_t> words) const {
     if (!values_.is_resident()) return;
     for (const uint32_t word : words) values_.prefetch(word);

@@ -62,10 +62,10 @@ constexpr Outcome outcome_of(Operation operation, const NodePair& cubes, const N
   return Outcome::kUnknown;
 }
 
-// Returns the reference file. The counts of the result are the counts of this file, plus the
-// changes at the places where the result differs (count_levels.h). So if most of the result is in
-// this file, only few nodes must be counted. kEmpty means that there is no reference file, and all
-// nodes of the result are counted.
+// Returns the reference file. The counts of the result (voxels and octree nodes) are the counts of
+// this file, plus the changes at the places where the result differs (count_levels.h). So if most
+// of the result is in this file, only few nodes must be counted. kEmpty means that there is no
+// reference file, and all nodes of the result are counted.
 constexpr Outcome reference_of(Operation operation, uint64_t nodes_of_a, uint64_t nodes_of_b) {
   if (operation == Operation::kAnd) return Outcome::kEmpty;
   if (operation == Operation::kMinus) return Outcome::kA;

@@ -14,7 +14,7 @@ void add_use(MarkedNodes<Use>& nodes, Marks& marks, const Use& use) {
   marks.mark(use.offset);
 }
 
-// Completes the uses, and stores the marks in `nodes`. Must be called after the last mark.
+// Completes nodes.uses, and stores `marks` in nodes.bits. Must be called after the last mark.
 template <class Use>
 void finish(MarkedNodes<Use>& nodes, const Marks& marks) {
   nodes.uses.finish(true);
@@ -40,8 +40,8 @@ void PairLevels::add(Open& to, const NodePair& cubes, uint64_t place) const {
     add_result(to, cubes, outcome, place);
 }
 
-// Adds the known result of a place, and the place's change of the counts relative to the reference
-// file (count_levels.h).
+// Adds to `to` the known result of a place (result_rows.h), and the change of the place's counts
+// relative to the reference file (count_levels.h).
 void PairLevels::add_result(Open& to, const NodePair& cubes, Outcome result, uint64_t place) const {
   if (result == Outcome::kA) add_use<NodeUse>(to.pairs->kept_a, to.kept_a, {cubes.a, place});
   if (result == Outcome::kB) add_use<NodeUse>(to.pairs->kept_b, to.kept_b, {cubes.b, place});

@@ -24,8 +24,8 @@
 
 namespace voxdag::query {
 
-// Marked (kept or counted) nodes of one level of one file. `uses` has the places that use these
-// nodes, as their result or for a change of their counts.
+// Marked (kept or counted) nodes of one level of one file. `uses` has the places (result_rows.h)
+// that use these nodes, as their result or for a change of their counts.
 template <class Use>
 struct MarkedNodes {
   explicit MarkedNodes(const SpillSpace& space) : uses(space), bits(space) {}

@@ -28,7 +28,7 @@ struct Row {
   uint64_t children[8] = {};  // word offsets; for a brick, children[0] is its mask
 };
 
-// Returns a number < 0, 0 (equal) or > 0.
+// Returns a negative number if `a` is before `b`, 0 if they are equal, otherwise a positive number.
 inline int compare_rows(const Row& a, const Row& b) {
   if (a.hash != b.hash) return a.hash < b.hash ? -1 : 1;
   if (a.mask != b.mask) return a.mask < b.mask ? -1 : 1;
@@ -51,28 +51,28 @@ constexpr uint64_t place_of(uint64_t pair, int child) {
 constexpr uint64_t pair_of(uint64_t place) { return place / 8; }
 constexpr int child_of(uint64_t place) { return static_cast<int>(place % 8); }
 
-// A request to combine a pair of cubes, whose result is the result of `place`.
+// A request to combine a pair of cubes. Its result is the result of `place`, a child of a pair.
 struct PairRequest {
   NodePair cubes;
   uint64_t place = 0;
   friend auto operator<=>(const PairRequest&, const PairRequest&) = default;
 };
 
-// A place whose result is the result of the pair `pair` of the next finer level.
+// A place (a child of a pair) whose result is the result of pair `pair` of the next finer level.
 struct PairUse {
   uint64_t pair = 0;
   uint64_t place = 0;
 };
 
-// A place whose result is the node at `offset` of one of the files.
+// A place (a child of a pair) whose result is the node at word `offset` of one of the files.
 struct NodeUse {
   uint64_t offset = 0;
   uint64_t place = 0;
   friend auto operator<=>(const NodeUse&, const NodeUse&) = default;
 };
 
-// A place whose counts change by `sign` times the counts of the node at `offset` of one of the
-// files.
+// A place (a child of a pair) whose counts change by `sign` times the counts of the node at word
+// `offset` of one of the files.
 struct CountUse {
   uint64_t offset = 0;
   uint64_t place = 0;
@@ -100,7 +100,7 @@ struct KeyedNode {
   friend bool operator<(const KeyedNode& a, const KeyedNode& b) { return a.key < b.key; }
 };
 
-// The row of the result of a pair.
+// The result of a pair, as a Row. `pair` is the number of the pair.
 struct PairRow {
   Row row;
   uint64_t pair = 0;

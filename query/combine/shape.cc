@@ -29,7 +29,8 @@ int64_t halves_of(double number, const std::string& text) {
   return static_cast<int64_t>(2 * number);
 }
 
-// Returns the position of a cube on an axis, in cubes of its size. `cube` is its code.
+// Returns the position of a mixed cube on an axis, in units of its edge. `cube` is the cube's code
+// (Shape::cube()).
 constexpr int64_t cube_index(uint64_t cube, int axis) {
   return static_cast<int64_t>(cube >> kIndexBits * (2 - axis) & ((uint64_t{1} << kIndexBits) - 1));
 }

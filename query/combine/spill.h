@@ -27,7 +27,7 @@ namespace voxdag::query {
 struct SpillSpace {
   ScratchFolder& folder;
   MemoryBudget& budget;
-  uint64_t list_bytes = 0;    // maximum memory of a list without its scratch file
+  uint64_t list_bytes = 0;    // maximum memory of a SpillList
   uint64_t sorter_bytes = 0;  // maximum memory of a SpillSorter before finish()
   uint64_t buffer_bytes = 0;  // size of the buffers with which scratch files are read
 };
@@ -305,12 +305,13 @@ class SpillBuckets {
 
  private:
   struct Bucket {
-    std::vector<uint64_t> chunks;  // their numbers in the file
+    std::vector<uint64_t> chunks;  // numbers of the bucket's chunks in the file
     uint64_t size = 0;
     uint64_t buffered = 0;
     uint64_t read = 0;
   };
-  // Writes a complete chunk, so that chunks begin at multiples of their size.
+  // Writes the bucket's buffer as a chunk. Writes all of the buffer even if it is not full, so that
+  // all chunks have the same size.
   void store(size_t bucket) {
     Bucket& from = buckets_[bucket];
     if (from.buffered == 0) return;

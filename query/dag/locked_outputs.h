@@ -28,8 +28,8 @@ class LockedOutputs {
   // `replace` is false; kNotFound if an output's folder does not exist.
   LockedOutputs(FileSystem& files, const Outputs& outputs);
   // Returns the file system through which the command writes its outputs. Unless `replace` is true,
-  // this file system does not replace a file that another program creates at an output after the
-  // constructor.
+  // this file system does not replace a file that another program creates at an output's path after
+  // the constructor has returned.
   FileSystem& files() { return guarded_; }
 
  private:

@@ -25,8 +25,8 @@ int64_t world_to_cell(const voxdag_reader::File& file, uint32_t grid_levels, siz
 Region world_to_region(const voxdag_reader::File& file, uint32_t grid_levels,
                        const std::array<double, 6>& box);
 
-// Throws Error{kInvalidInput} if the selection's grid has more than `file_levels` levels, the
-// levels of the file's grid, or fewer than 4 cells per edge.
+// Throws Error{kInvalidInput} if the selection's grid has fewer than 4 cells per edge, or more
+// levels than the file's grid. `file_levels` is the number of levels of the file's grid.
 void check_grid(const Selection& selection, uint32_t file_levels);
 
 }  // namespace voxdag::query

@@ -10,7 +10,7 @@
 namespace voxdag::query {
 
 // Creates a folder whose name is `prefix` and random characters. The destructor removes the folder
-// with its contents. If the process ends before, the folder is removed as a TemporaryPath.
+// with its contents. If the process ends earlier, remove_temporary_paths() removes the folder.
 class TemporaryWork {
  public:
   TemporaryWork(FileSystem& files, const std::string& prefix)
@@ -19,7 +19,7 @@ class TemporaryWork {
     try {
       remove_tree(files_, path_);
     } catch (const Error&) {
-      // Remaining files are useless but harmless.
+      // This error is ignored, because the remaining files are harmless.
     }
   }
   TemporaryWork(const TemporaryWork&) = delete;

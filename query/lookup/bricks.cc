@@ -44,7 +44,7 @@ bool is_full(const DagView& dag, uint32_t depth, uint64_t content, uint32_t grid
   const DagView::Children children = dag.children(depth, content);
   if (children.mask != 255) return false;
   if (depth + 1 == grid_levels) return true;
-  uint64_t before = 0;  // the child before, which is full; equal children need one look
+  uint64_t before = 0;  // content of the previous child, which is full; equal children are skipped
   for (int i = 0; i < 8; ++i) {
     const uint64_t child = dag.content(depth, children, i);
     if (i > 0 && child == before) continue;

@@ -40,8 +40,8 @@ uint64_t mask_within(const Region& region, const Position& low);
 // Throws Error{kInvalidInput} unless 0 <= grid_levels <= the file's levels.
 void check_grid_levels(const DagView& dag, uint32_t grid_levels);
 
-// True if all cells are set in the cube with this depth and content (DagView) in a grid of
-// 2^grid_levels cells per edge.
+// `depth` and `content` (dag_view.h) identify an octree cube. True if all cells in this cube are
+// set. The cells are the cells of the grid of 2^grid_levels cells per edge.
 bool is_full(const DagView& dag, uint32_t depth, uint64_t content, uint32_t grid_levels);
 
 // The implementation of for_each_brick() and for_each_brick_or_full_cube().

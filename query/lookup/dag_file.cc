@@ -28,7 +28,7 @@ namespace voxdag::query {
 namespace {
 
 // Number of points or rays that a thread processes as one batch. It is a multiple of the number of
-// rays in a packet, so only the last packet of a call can be incomplete.
+// rays in a RayPacket, so only the last packet of a call can be incomplete.
 constexpr size_t kBatch = 4096;
 
 [[noreturn]] void refuse(const std::string& what) {

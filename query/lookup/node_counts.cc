@@ -21,9 +21,9 @@ NodeCounts::NodeCounts(const voxdag_reader::File& file, const DagView& dag, uint
   }
 }
 
-// Stores the counts of all nodes down to two levels above the grid's cells, at most to the level
-// above the bricks. Bricks, and nodes whose children are the grid's cells, need no stored counts:
-// their counts are the numbers of bits in their masks.
+// Stores the counts of the nodes on all levels that are above the bricks and at least two levels
+// above the grid's cells. Bricks, and nodes whose children are the grid's cells, need no stored
+// counts: their counts are the numbers of bits in their masks.
 void NodeCounts::store(const voxdag_reader::File& file, MemoryBudget& budget,
                        const CancelToken& cancel) {
   if (grid_levels_ < 2 || dag_.grid_levels() < 3) return;

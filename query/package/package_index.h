@@ -62,7 +62,7 @@ inline constexpr const char* kIndexName = "package.json";
 std::string index_text(const PackageIndex& index);
 // Parses the text of package.json, and checks that its numbers are consistent. Throws
 // Error{kCorrupt}, or Error{kUnsupportedVersion} for a version that this program does not know.
-// `path` begins the messages.
+// Error messages begin with `path`.
 PackageIndex parse_index(std::string_view text, const std::string& path);
 
 // Returns the file name `stem`-HASH`suffix`. HASH is the XXH64 of `contents`, as 16 hex digits.

@@ -23,10 +23,10 @@ class PackageReader {
   const PackageIndex& index() const { return index_; }
   // Returns the number L of levels of the grid, which has 2^L voxels per edge.
   uint32_t grid_levels() const { return grid_levels_; }
-  // Returns the words of a tile, as encode_tile() returns them, with one difference: the address of
-  // a cut-off node is the number of the next tile, not a word offset. `number` is the number of the
-  // tile among the tiles whose roots are on `level`. Throws Error{kNotFound} if the package has no
-  // such tile, and Error{kCorrupt} if its block is damaged.
+  // Returns the words of a tile, as encode_tile() returns them, with one difference: for a node at
+  // which the tile ends, they have the number of the tile that begins there, not a word offset.
+  // `number` is the number of the tile among the tiles whose roots are on `level`. Throws
+  // Error{kNotFound} if the package has no such tile, and Error{kCorrupt} if its block is damaged.
   std::vector<uint32_t> tile(uint32_t level, uint64_t number) const;
   // Returns the words of a color page (color_page.h). The result is {0} if no cell of the page is
   // set.

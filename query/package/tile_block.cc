@@ -52,7 +52,8 @@ class Columns {
   std::string_view left_;
 };
 
-// A leaf of a tile: the mask of a brick, or the coarse brick and the tile number of a cut-off node.
+// A leaf of a tile: the mask of a brick; or, for a cut-off node (a node above the bricks at which
+// the tile ends), its coarse brick and the number of the tile that begins there.
 struct Leaf {
   uint64_t mask = 0;
   uint32_t number = 0;
@@ -145,8 +146,8 @@ size_t children_of(std::string_view masks) {
   return children;
 }
 
-// Reads the tile numbers of the leaves, which are cut-off nodes. `next` is the next number to which
-// no leaf has referred yet; it is increased for each leaf that refers to it.
+// Reads the tile numbers of the leaves, which are cut-off nodes. `next` is the smallest tile number
+// to which no earlier leaf refers. Each leaf that refers to this number increases it by 1.
 void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next) {
   const std::string_view is_old = columns.take((leaves.size() + 7) / 8);
   const auto old = [&](size_t i) { return is_old[i / 8] >> i % 8 & 1; };

@@ -34,17 +34,18 @@ class TileBlockEncoder {
 
   uint32_t first_, next_;
   std::array<std::string, kPackageTileLevels> masks_;  // child masks, by level of the tile
-  std::array<std::string, 8> bricks_;                  // bytes of all leaves' masks, by byte
+  std::array<std::string, 8> bricks_;                  // bricks_[i] has byte i of all leaves' masks
   bool has_references_ = false;
   size_t leaves_ = 0;
   std::string is_old_;  // one bit per leaf: 1 if an earlier leaf of the band has the same number
-  std::array<std::string, 4> old_;  // bytes of the distances to the next new number, by byte
+  // For each leaf with a 1 in is_old_: next_ minus the leaf's number. old_[i] has byte i of each.
+  std::array<std::string, 4> old_;
 };
 
 // The tiles of a block.
 struct TileBlock {
-  uint32_t first = 0;  // the next new tile number before the block
-  uint32_t next = 0;   // the next new tile number after the block
+  uint32_t first = 0;  // smallest tile number to which no leaf before the block refers
+  uint32_t next = 0;   // the same after the block
   std::vector<std::vector<uint32_t>> tiles;
 };
 

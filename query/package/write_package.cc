@@ -23,7 +23,7 @@ namespace {
 
 constexpr size_t kDigestDigits = 32;
 constexpr uint64_t kWindowBlocks = 64;  // blocks that are encoded concurrently
-constexpr uint64_t kRootsShare = 16;    // divisor of the memory: memory of a list of roots
+constexpr uint64_t kRootsShare = 16;    // a list of roots may use 1/16 of the memory
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
 
 // Writes the bands of tiles and color pages of a file, from coarse to fine.
@@ -54,8 +54,8 @@ class BandWriter {
       auto next = write_band(level, *roots);
       numbers = std::move(next);  // releases the numbers of the band above
       if (numbers) roots = &numbers->offsets();
-      // The coarse bricks at the end of a tile have cells two levels below its end. The colors of
-      // these cells follow the tiles.
+      // The coarse bricks of these tiles have cells two levels below the level at which the tiles
+      // end. The colors of these cells follow the tiles.
       if (spec_.colors) colors_.write_levels(end_of(level) + kBrickLevels);
     }
     if (spec_.colors) colors_.write_levels(dag_.grid_levels());
@@ -166,8 +166,8 @@ std::string digest_of(const PackageIndex& index) {
   return sha256_hex(text).substr(0, kDigestDigits);
 }
 
-// Sets the manifest of the index: the manifest of the request with the digest, and without the
-// member "colors" if no colors were written.
+// Sets the manifest of the index: spec.manifest with the digest added and, if no colors were
+// written, with the member "colors" removed.
 void complete_manifest(const PackageSpec& spec, PackageIndex& index) {
   index.manifest = spec.manifest;
   auto manifest = nlohmann::ordered_json::parse(spec.manifest);

@@ -35,7 +35,7 @@ struct PackageSpec {
   uint64_t pack_bytes = uint64_t{8} << 20;
   uint64_t memory_bytes = uint64_t{1} << 30;
   unsigned threads = 1;
-  // Additional limit for the memory of a list of nodes, which also is at most a share of
+  // Additional limit for the memory of a list of nodes, which otherwise gets a fixed share of
   // memory_bytes. Tests use a small limit.
   uint64_t list_bytes = ~uint64_t{0};
 };

@@ -7,11 +7,11 @@
 // which gives the child its new offset.
 //
 // If the nodes of the next level fit in memory, they are read directly (forwarded_level.h).
-// Otherwise, the child pointers are sorted three times on the disk:
+// Otherwise, three sorts on the disk replace these reads:
 //
-//   1. by child, to find the first pointer to each child;
+//   1. the child pointers by child, to find the first pointer to each child;
 //   2. the children by their first pointers, which gives their order and so their new offsets;
-//   3. the pointers by their position in the output file, in which they are written.
+//   3. the new pointers by their position in the output file, because they are written in order.
 #pragma once
 
 #include <cstdint>

@@ -24,9 +24,9 @@ struct DagStats {
   uint64_t octant_masks = 0;
 };
 
-// Returns the statistics of a file. Needs 8 bytes per node of each level and of the next, and 2
-// bits per word of these levels. Throws Error{kOutOfMemory} if they do not fit in the budget,
-// Error{kCorrupt}, Error{kCanceled}.
+// Returns the statistics of a file. Needs 8 bytes per node and 2 bits per word of two consecutive
+// levels. Throws Error{kOutOfMemory} if this memory does not fit in the budget, Error{kCorrupt},
+// Error{kCanceled}.
 DagStats dag_stats(const voxdag_reader::File& file, MemoryBudget& budget,
                    const CancelToken& cancel);
 

@@ -54,8 +54,8 @@ std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks,
   return starts;
 }
 
-// Replaces the children's numbers by the children's word indexes `child_starts`, in the nodes from
-// word `begin` to word `end`.
+// In the nodes from word `begin` to word `end`, replaces the number of each child by the child's
+// word index, child_starts[number].
 void point_to(const std::vector<uint32_t>& child_starts, size_t begin, size_t end,
               std::vector<uint32_t>& words) {
   while (begin < end) {
@@ -109,7 +109,7 @@ void add_cut_off(const DagView& dag, const CheckedBlocks* blocks, uint32_t level
 }  // namespace
 
 uint32_t tile_end(uint32_t grid_levels, uint32_t tile_levels, uint32_t level) {
-  const uint32_t below = grid_levels - kBrickLevels - level;  // levels below `level`, with bricks
+  const uint32_t below = grid_levels - kBrickLevels - level;  // number of levels below `level`
   return level + (below - 1) % tile_levels + 1;
 }
 

@@ -31,8 +31,9 @@ struct ColorSampleReport {
 
 // Compares the attributes of `file`, which must have at least one, with `scene`, which must be the
 // scene of the build. `grid` is the file's grid. Makes one pass over the scene. Stores large images
-// in a scratch file at `scratch_path`. `cutouts`: the cutouts that the file leaves out, or null.
-// Throws Error{kCorrupt} with the first wrong region, and the errors of TextureSet::prepare().
+// in a scratch file at `scratch_path`. `cutouts`: the invisible texels, if the build has left out
+// invisible parts of the surface; otherwise null. Throws Error{kCorrupt}, whose message names the
+// first wrong region, and the errors of TextureSet::prepare().
 ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& grid,
                                          FileSystem& files, TriangleSource& scene, uint64_t seed,
                                          const std::string& scratch_path, unsigned threads,

@@ -52,8 +52,8 @@ bool EmptyCubes::has_center() const {
 EmptyCubes::Step EmptyCubes::step_from(int axis, int side) const {
   const auto a = static_cast<size_t>(axis), b = (a + 1) % 3, c = (a + 2) % 3;
   const int middle = radius_ + 1;  // position of the center in the block, along each axis
-  // By position along b and c: 1 if an empty cube would move over this voxel of the layer of the
-  // center.
+  // For each voxel of the center's layer, by position along the axes b and c: 1 if an empty cube
+  // that steps into this layer would move over the voxel.
   std::vector<uint8_t> is_in_path(side_ * side_);
   Step out;
   std::array<int, 3> low;

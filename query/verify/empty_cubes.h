@@ -1,6 +1,6 @@
 // Finds the cubes of radius + 1 voxels per edge near one voxel, the center, whose voxels are all
-// empty. A check of enclosed solids uses them: such a cube makes the walks of docs/solid.md,
-// "Enclosed". Voxels outside the grid are empty.
+// empty. A check of enclosed solids uses them. A walk (docs/solid.md, "Enclosed") is a sequence of
+// steps of such a cube. Voxels outside the grid are empty.
 #pragma once
 
 #include <array>
@@ -33,7 +33,7 @@ class EmptyCubes {
   Step step_from(int axis, int side) const;
 
  private:
-  // Returns the number of set voxels in [low, high). Positions are in sums_.
+  // Returns the number of set voxels in [low, high). Positions count from the block's low corner.
   int count(const std::array<int, 3>& low, const std::array<int, 3>& high) const;
   // True if the cube of radius + 1 voxels per edge with the low corner `low` has no set voxel.
   bool is_empty(const std::array<int, 3>& low) const;

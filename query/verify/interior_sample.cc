@@ -17,7 +17,7 @@ namespace voxdag::query {
 namespace {
 
 struct SampledVoxel {
-  int64_t low[3];    // low corner, in lattice units
+  int64_t low[3];    // low corner, in lattice units (1/256 voxel)
   int64_t left[3];   // by axis: sum of the signs of the crossings before the center
   int64_t total[3];  // by axis: sum of the signs of all crossings
   bool is_touched;   // a triangle touches the voxel
@@ -85,7 +85,7 @@ bool is_closed(SolidRule rule, const SampledVoxel& voxel) {
 }
 
 // Calls add_triangle() for each triangle of the scene, in integer coordinates. Leaves out triangles
-// with a coordinate that is too large for them. Returns false if it has left out a triangle.
+// that convert() refuses. Returns false if it has left out a triangle.
 template <class Add>
 bool add_scene(TriangleSource& scene, const Grid& grid, Progress& progress,
                const CancelToken& cancel, const Add& add_triangle) {

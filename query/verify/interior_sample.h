@@ -1,15 +1,15 @@
 // Compares a random sample of a solid's voxels with the scene. A voxel's winding number is the sum
-// of the signs of the crossings before its center, on one of the three rows through the center. It
-// is computed for each voxel separately; only the test for a crossing is shared with the builder of
-// solids.
+// of the signs of the crossings (core/geometry/crossing.h) before the voxel's center, on one of the
+// three rows (lines along an axis) through the center. The number is computed for each voxel
+// separately. Only the test for a crossing is shared with the builder of solids.
 //
 // On a closed surface, the winding number is the same along all rows, and decides every voxel that
 // no triangle touches. If the signs on a row do not add up to 0, the surface is not closed. A build
 // then decides voxels by majorities of rows, so only voxels that triangles touch are compared.
 //
-// The voxels of an enclosed solid are compared with their neighbors in the file instead. A cube of
-// radius + 1 voxels per edge makes the walks (docs/solid.md, "Enclosed"). Voxels outside the grid
-// are empty.
+// The voxels of an enclosed solid are compared with their neighbors in the file instead. Walks
+// (docs/solid.md, "Enclosed") move an empty cube of radius + 1 voxels per edge, one voxel per step.
+// Voxels outside the grid are empty.
 //
 // - A voxel that is not set must be in an empty cube, because the walks have reached it.
 // - A set voxel may be next to an empty cube, which would contain the voxel after one step. Then

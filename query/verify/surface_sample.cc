@@ -188,7 +188,7 @@ void mark_thin(const FixedTriangle& t, SampleBox& box) {
 }
 
 // Sets the voxels of the box that the triangle touches, and in which it is visible. `part` is null
-// if the triangle is not cut out.
+// if the complete triangle is visible.
 void mark(const FixedTriangle& t, const VisiblePart* part, SampleBox& box) {
   int64_t first[3], last[3], corner[3];
   for (int a = 0; a < 3; ++a) {

@@ -30,8 +30,8 @@ struct SampleBox {
 };
 
 // Computes a sample. Returns at most kSampleBoxes boxes, and none if no triangle touches the grid.
-// `cutouts`: the cutouts that the file leaves out, or null. `rule`: the rule of the build; cutouts
-// need kShell.
+// `cutouts`: the invisible texels, if the build has left out invisible parts of the surface;
+// otherwise null. `rule`: the rule of the build; kShell if `cutouts` is not null.
 std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, uint64_t seed,
                                       Progress& progress, const CancelToken& cancel,
                                       const Cutouts* cutouts = nullptr,
