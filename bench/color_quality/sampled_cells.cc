@@ -86,7 +86,7 @@ struct SampledCells::Plane {
       length += std::abs(normal[a]);
     }
   }
-  // True if the plane certainly misses a cube.
+  // True if the plane misses the cube with this center and half edge, whatever the rounding errors.
   bool misses(const double (&center)[3], double half) const {
     double distance = -offset, scale = std::abs(offset);
     for (int a = 0; a < 3; ++a) {

@@ -14,7 +14,8 @@ namespace voxdag {
 
 class SceneLooks {
  public:
-  // Decodes all images, with 16 bytes per texel. Ignores broken images.
+  // Decodes all images, with 16 bytes per texel. Prints a message for each image that it cannot
+  // decode; the materials that use this image are then treated as materials without an image.
   SceneLooks(const SceneMaterials& materials, MemoryBudget& budget);
   // Converts a surface. The result refers to this object's materials.
   oracle::Surface surface(const FixedSurface& surface) const;
