@@ -24,7 +24,7 @@ WorldCube default_cube(const std::vector<WorldTriangle>& triangles);
 WorldCube cube_of_voxel_size(const std::vector<WorldTriangle>& triangles, double voxel_size,
                              int64_t resolution);
 
-// Snaps all triangles. Omits triangles whose boxes miss the grid.
+// Snaps all triangles to the lattice. Omits triangles whose bounding boxes miss the grid.
 Triangles snap(const std::vector<WorldTriangle>& triangles, const WorldCube& cube,
                int64_t resolution);
 

@@ -6,7 +6,8 @@
 
 namespace oracle {
 
-// `low` and `edge` are in lattice units. Coordinates are at most kWidest + 1.
+// `low`: the cube's low corner. `low` and `edge` are in lattice units (1/256 voxel). Coordinates
+// are at most kWidest + 1.
 bool touches(const Triangle& triangle, const Point& low, int64_t edge);
 
 }  // namespace oracle

@@ -174,7 +174,7 @@ class Maker {
   }
 
   Random random_;
-  const int64_t size_;  // of the region, in units
+  const int64_t size_;  // edge of the region, in lattice units
   const int64_t voxels_;
   Point low_;
 };

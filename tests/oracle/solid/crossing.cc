@@ -44,13 +44,15 @@ Number area(const Point& from, const Point& to, const Point& other, int b, int c
   return u[0] * w[1] - u[1] * w[0];
 }
 
-// Returns on which side of the edge from u to w the moved point p is, in the projection.
+// Returns on which side of the edge from u to w the moved point p (crossing.h) is, in the
+// projection onto the axes b and c.
 int side_of_edge(const Point& u, const Point& w, const Point& p, int b, int c) {
   const Polynomial pb = moved(p, b) - u[b], pc = moved(p, c) - u[c];
   return (pc * (w[b] - u[b]) + pb * (u[c] - w[c])).sign();
 }
 
-// Returns on which side of the triangle's plane the moved point p is: the sign of a determinant.
+// Returns on which side of the triangle's plane the moved point p (crossing.h) is: the sign of a
+// determinant.
 int side_of_plane(const Triangle& t, const Point& p) {
   Polynomial volume;
   for (int a = 0; a < 3; ++a)

@@ -18,8 +18,8 @@ struct Crossing {
 // are odd, at most kWidest; p has even coordinates.
 Crossing crossing_of(const Triangle& triangle, const Point& p, int axis);
 
-// Returns the sign of the crossing between p and the point `length` units further along the axis,
-// or 0 if the triangle does not cross this leg; length > 0.
+// Returns the sign of the crossing between p and the point that is `length` lattice units further
+// along the axis, or 0 if the triangle does not cross this segment. `length` must be above 0.
 int leg_crossing(const Triangle& triangle, const Point& p, int axis, int64_t length);
 
 // Returns the winding number of p: the sum of the signs of the crossings that a ray from p against

@@ -1,5 +1,5 @@
 // Meshes with an inside, for the rules of crossings and solids: closed, open, nested, inverted,
-// doubled, touching and random ones, and meshes made of ties.
+// doubled, touching and random ones, and meshes with edges through voxel corners and centers.
 #pragma once
 
 #include <string>

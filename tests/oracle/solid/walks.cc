@@ -9,8 +9,8 @@ namespace {
 
 using Place = std::array<int, 3>;
 
-// Calls visit(voxel) for the voxels in the grid of the cube with the low corner `cube` and radius +
-// 1 voxels per edge.
+// Calls visit(voxel) for each voxel of a cube that is inside the grid. `cube` is the low corner of
+// the cube, which has radius + 1 voxels per edge.
 template <class Visit>
 void for_each_voxel(const Place& cube, int radius, int edge, Visit visit) {
   const auto in_grid = [&](int coordinate) { return coordinate >= 0 && coordinate < edge; };

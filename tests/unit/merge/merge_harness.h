@@ -27,7 +27,7 @@ struct MergeOptions {
   CancelToken* cancel = nullptr;
   Checkpoint* checkpoint = nullptr;
   Progress* progress = nullptr;
-  double checkpoint_interval_s = 0;  // 0: after every level; the merge waits for each
+  double checkpoint_interval_s = 0;  // 0: saves after every level, and waits for each save
 };
 
 struct Merged {

@@ -73,9 +73,9 @@ TEST(Merge, NoArtifactsGiveAFileWithoutNodes) {
 }
 
 // The merge that Sintorn's tutorial "DAG Construction" (2018) published omitted the child mask from
-// the hash. So two equal sub-DAGs in different octants of different parents became one parent, and
-// voxels moved. In this test, two such pairs of sub-DAGs must keep their positions over two levels
-// of the merge.
+// the hash. So two parents that had equal sub-DAGs in different octants became one node, and voxels
+// moved. In this test, two such pairs of parents must remain different nodes, on two consecutive
+// levels of the merge.
 TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
   oracle::Voxels voxels(32);
   const auto blob = [&](int x, int y, int z) {

@@ -54,7 +54,7 @@ TEST_F(CApiTest, StructsOfOtherSizes) {
     voxdag_facts known{};
     uint64_t unknown = 7, behind = 7;
   } later;
-  facts.struct_size = SIZE_MAX;  // a member of a struct that was not initialized
+  facts.struct_size = SIZE_MAX;  // as in a struct that was not initialized
   EXPECT_EQ(voxdag_get_facts(file_, &facts), VOXDAG_INVALID_INPUT);
   later.known.struct_size = sizeof(voxdag_facts) + 8;
   ASSERT_EQ(voxdag_get_facts(file_, &later.known), VOXDAG_OK);

@@ -1,5 +1,5 @@
-// A file from which a shape is cut has the bytes of the file that the oracle makes from the other
-// voxels.
+// A file from which a shape is cut has the bytes of the file that the oracle makes from the
+// remaining voxels.
 #include "query/combine/shape.h"
 #include "tests/unit/query/combine/combine_fixture.h"
 

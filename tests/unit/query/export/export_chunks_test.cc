@@ -39,7 +39,7 @@ class ExportChunks : public testing::Test {
     return nlohmann::json::parse(read_bytes(folder() + "/manifest.json"));
   }
   std::string folder() const { return folder_.file("chunks"); }
-  // Returns the `count` cells of an exported .npz file. Its first array has them.
+  // Returns the `count` cells of an exported .npz file, which are the file's first array.
   QueryFile::Cells cells_in(const std::string& path, uint64_t count) const {
     const std::string bytes = read_bytes(folder() + "/" + path);
     size_t at = bytes.find('\n') + 1;  // after the header of the array

@@ -129,7 +129,7 @@ TEST_P(ExportDisks, Full) {
   take("out");
 }
 
-// A disk without free space. An export must notice this before it creates a file.
+// A disk with 100 free bytes. An export must notice this before it creates a file.
 class NoSpace : public ForwardingFiles {
  public:
   NoSpace() : ForwardingFiles(system_files()) {}

@@ -143,8 +143,8 @@ TEST_F(ExportHuge, HashDagCountsWordsWith32Bits) {
                  "9 (512");
 }
 
-// HashDAG's top levels must have fewer than 2^24 nodes in total, because each of them stores a
-// 24-bit index where other nodes store a count of voxels.
+// HashDAG's top levels must have fewer than 2^24 nodes in total, because each of these nodes stores
+// a 24-bit index where other nodes store a count of voxels.
 TEST_F(ExportHuge, HashDagCountsTopNodesWith24Bits) {
   std::vector<GlobalLevel> levels = chain(17);
   const uint64_t others = 9;

@@ -118,8 +118,8 @@ TEST_F(Extract, InSteps) {
   EXPECT_TRUE(bytes("box_in_box.vdag") == bytes("inner.vdag"));
 }
 
-// The bytes are the same for any number of threads, and if cubes that do not fit in their share of
-// the memory are divided.
+// The bytes are the same for any number of threads and for any memory. With little memory, cubes
+// are divided, because they do not fit in their share of the memory.
 TEST_F(Extract, MemoryAndThreads) {
   const oracle::Voxels voxels = noise(5, 128);
   write_global(path("in.vdag"), voxels);

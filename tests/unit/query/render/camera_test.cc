@@ -29,8 +29,9 @@ void project(const Placement& p, const Vec& point, int width, int height, double
   y = height / 2.0 - dot(d, up) * scale;
 }
 
-// The ray through the center of the picture points to the target. Rays at the upper edge differ
-// from it by half the field of view. x increases to the right, y downward.
+// The ray through the center of the picture points to the target. The angle between this ray and
+// the ray through the middle of the upper edge is half the field of view. x increases to the right,
+// y downward.
 TEST(Camera, RaysFollowTheFieldOfView) {
   const Camera camera({{{0, 0, 10}}, {{0, 0, 0}}, 90}, 200, 100);
   expect_near(camera.ray(100, 50).direction, {{0, 0, -1}});

@@ -81,7 +81,8 @@ TEST(Views, CanBeStopped) {
             ErrorCode::kCanceled);
 }
 
-// Computing several views of a scene together gives the same views as computing each of them.
+// NamedViews, which computes shared data only once, returns the same camera placements as separate
+// calls of named_view().
 TEST(Views, AreTheSameTogether) {
   const VoxelScene scene(6, {{4, 4, 4}, {9, 58, 7}, {44, 12, 50}, {60, 1, 3}});
   const DagView dag = scene.view();
