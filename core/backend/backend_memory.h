@@ -1,7 +1,7 @@
 // Divides the budget of one Backend::build() call among the caches and tables that only make the
 // build faster. A structure that exceeds its part is made smaller or omitted; the result is the
-// same. All other memory of a build (triangles, tile bricks, the tables as they grow) is allocated
-// on demand, until the budget refuses it and the subvolume is split.
+// same. All other memory of a build (triangles, the bricks of a tile, tables that grow) is
+// allocated on demand. If the budget refuses it, the subvolume is split.
 //
 // Only the CPU backend has these parts. kSmallestBudget (backend.h) is enough for a build with
 // these parts. In the functions, `budget_bytes` is the complete budget, and `free_bytes` the part

@@ -35,9 +35,9 @@ class SubvolumeBuild {
   // Returns the node of a cube with an edge of 2^size_log2 voxels. The triangles that may touch the
   // cube are entries_[first, first + count).
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);
-  // The node of a cube of a solid. A cube without voxels of the shell (is_empty) has no node yet.
-  // If the cube's parent is also empty, the parent has no node either. Otherwise the parent chooses
-  // the cube's node from the cube's views.
+  // The result of build_solid() for a cube of a solid. For a cube without voxels of the shell,
+  // `is_empty` is true and there is no node yet. build_solid() for the cube's parent then chooses
+  // the node by SolidFill::decide(), unless the parent is also empty.
   struct SolidNode {
     NodeRef node;
     bool is_empty = false;

@@ -114,7 +114,7 @@ uint64_t CudaDevice::available(const std::string& where) const {
              "cudaMemPoolGetAttribute", where);
   check_call(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &used),
              "cudaMemPoolGetAttribute", where);
-  // Other workers may allocate between these calls, so `used` can exceed `reserved`.
+  // Other workers may allocate memory between the calls above, so `used` can exceed `reserved`.
   return free_bytes + (reserved > used ? reserved - used : 0);
 }
 
@@ -133,8 +133,8 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   return memory;
 }
 
-// If the call fails, clears the CUDA runtime's last error of this thread, because the next call of
-// CUB would return this error as its own result.
+// Frees device memory in stream order. If this fails, clears the CUDA runtime's last error of this
+// thread, because the next call of CUB would return this error as its own result.
 void CudaDevice::release(void* memory) noexcept {
   if (cudaFreeAsync(memory, stream()) != cudaSuccess) cudaGetLastError();
 }

@@ -29,8 +29,8 @@ namespace voxdag::cpu {
 struct Plane {
   int64_t n[3];
   int128 c;
-  // True if (n.q + c) / 256 is not an integer. This is the same for all cubes, because q is a
-  // multiple of 256. With the rule kThin, it is always true.
+  // True if (n.q + c) / 256 is not an integer, where q is the low corner of a cube. This is the
+  // same for all cubes, because q is a multiple of 256. With the rule kThin, it is always true.
   bool fractional;
   int64_t up, width;
 
@@ -42,7 +42,8 @@ struct Plane {
   int64_t rising() const;
   int64_t falling() const;
 
-  // In these functions, the cube has an edge of 2^size_log2 voxels; n, k and f are as above.
+  // In these functions, the cube has an edge of 2^size_log2 voxels. The comment on this struct
+  // explains n, k, f, p and c.
   //
   // True if, for every cube that the plane crosses, n.k + f fits in 62 bits at all corners k.
   bool fits(int size_log2) const;
@@ -84,7 +85,7 @@ int normal_sign(const Triangle<Int>& t, int axis) {
 // Returns the plane of a triangle, which must not be degenerate.
 Plane plane_of(const NarrowTriangle& t, VoxelRule rule);
 
-// The sides of a plane that are inside a solid. `below` is the side where n.p is smaller.
+// The sides of a plane that are inside a solid. `below` is the side with n.p + c < 0 (Plane).
 struct InnerSides {
   bool below = false, above = false;
 
@@ -93,8 +94,9 @@ struct InnerSides {
   bool operator==(const InnerSides&) const = default;
 };
 
-// The range of n.k for the voxels that a plane with offset f sets: low <= n.k <= high, where k is
-// the position of the voxel's low corner in the cube, in voxels.
+// The range of n.k for the voxels that a plane with offset f sets in a cube: low <= n.k <= high.
+// Here n and f are as for Plane, and k is the position of a voxel's low corner in the cube, in
+// voxels.
 struct PlaneRange {
   int64_t low, high;
 

@@ -24,9 +24,9 @@ void PlaneDirection::set_up(const Plane& plane, InnerSides inner) {
   buckets_per_unit_ = kBuckets / (static_cast<double>(span) + 1.0);
   int i = 0;
   for (int b = 0; b <= kBuckets; ++b) {
-    // Sets i to the first value in bucket b or a later bucket. The value at i - 1 is in an earlier
-    // bucket, so it is less than every offset f in bucket b. The value at i may be greater than
-    // such an offset.
+    // Sets i to the index of the first value in bucket b or a later bucket. The value at i - 1 is
+    // in an earlier bucket, so it is less than every offset f in bucket b. The value at i may be
+    // greater than such an offset.
     while (i < kCorners && bucket(values_[i]) < b) ++i;
     bucket_[b] = static_cast<uint16_t>(std::max(i - 1, 0));
   }

@@ -16,8 +16,8 @@
 
 namespace voxdag::cpu {
 
-// The nodes of one direction of planes. The planes must have Plane::fractional. Trivially copyable,
-// at most 24 KiB. Not thread-safe.
+// The nodes of one direction of planes. Plane::fractional must be true for the planes. Trivially
+// copyable, at most 24 KiB. Not thread-safe.
 class PlaneDirection {
  public:
   static constexpr int kSizeLog2 = 3;  // log2 of the edge of the nodes' cubes, in voxels
@@ -38,8 +38,9 @@ class PlaneDirection {
     return n_[0] == plane.n[0] && n_[1] == plane.n[1] && n_[2] == plane.n[2] && inner_ == inner;
   }
 
-  // Returns the values of n.k for the 512 voxels k of a node, in Morton order. The same values,
-  // multiplied by 8, are n.k for the low corners k of the 512 nodes in a tile of 64^3 voxels.
+  // Returns the values of n.k for the 512 voxels k of a node, in Morton order, where n is the
+  // direction. The same values, multiplied by 8, are n.k for the low corners k of the 512 nodes in
+  // a tile of 64^3 voxels.
   const int64_t* offsets() const { return offsets_; }
   // A plane sets voxels of a node iff its offset f is within [min_offset(), max_offset()].
   int64_t min_offset() const { return min_offset_; }

@@ -53,7 +53,7 @@ class PlaneMemo {
   // does not contain the plane (yet), or if Plane::fits() is false for cubes of this size.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
-  // Returns the plane of a triangle that covers a cube, or nothing if build() would return false.
+  // Returns the plane of a triangle that covers a cube; nullopt if build() would return false.
   std::optional<Found> find_plane(const TriangleSet& triangles, Entry entry, int size_log2);
   // Sets `node` to the node of a cube that the plane crosses, with an edge of at most 64 voxels.
   // The node has the voxels that the plane sets and all voxels of its inner sides. `f` is the
@@ -101,7 +101,8 @@ class PlaneMemo {
   NodeRef tile_node(PlaneDirection& direction, InnerSides inner, int64_t f, int size_log2);
   // Adds the full cubes of 8^3 voxels on the inner sides of a plane to the bit set `existing`,
   // which has the cubes that the plane crosses. Adds the nodes and voxels of the full cubes to
-  // `counts`.
+  // `counts`. `offsets`: PlaneDirection::offsets(). `count`: number of cubes of 8^3 voxels.
+  // `crossed`: range of the offsets at which the plane crosses a cube.
   void add_full(const int64_t* offsets, int count, InnerSides inner, const PlaneRange& crossed,
                 uint64_t (&existing)[8], OctreeCounts& counts);
   SmallNode& small_slot(uint64_t key);

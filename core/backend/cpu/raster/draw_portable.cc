@@ -87,8 +87,8 @@ uint64_t brick_mask(const TileTriangle<Coordinate>& t,
   return mask;
 }
 
-// Returns the voxels of a brick that the rule kThin sets: the union of the crossings along the
-// three axes.
+// Returns the voxels of a brick that the rule kThin sets: the voxels in which the triangle crosses
+// the row through the voxel's center along at least one axis.
 template <class Coordinate>
 uint64_t thin_brick_mask(const ThinTriangle<Coordinate>& t,
                          const VoxelOffsets<typename ThinTriangle<Coordinate>::Int>& offsets,
@@ -106,7 +106,7 @@ uint64_t thin_brick_mask(const ThinTriangle<Coordinate>& t,
   return mask;
 }
 
-// Returns false if the plane excludes the complete brick.
+// Returns false if the plane test excludes all voxels of the brick.
 template <class Coordinate>
 bool may_cross_plane(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   auto low = t.lowest, high = t.lowest;
@@ -118,7 +118,7 @@ bool may_cross_plane(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   return high >= 0 && low <= t.width;
 }
 
-// Returns false if the plane or an edge excludes the complete brick.
+// Returns false if the plane test or the test of an edge excludes all voxels of the brick.
 template <class Coordinate>
 bool may_touch(const TileTriangle<Coordinate>& t, const int (&brick)[3]) {
   if (!may_cross_plane(t, brick)) return false;

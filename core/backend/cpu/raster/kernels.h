@@ -83,7 +83,7 @@ void draw_avx2(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 void draw_avx512(const TileTriangle<int32_t>& triangle, TileBricks& tile);
 
 // The rasterizers of the rule kThin: each sets exactly the voxels that the rule sets for the
-// triangle. The machine requirements are as above.
+// triangle. They require the same instruction sets as the rasterizers above.
 template <class Coordinate>
 void draw_thin_exactly(const ThinTriangle<Coordinate>& triangle, TileBricks& tile);
 void draw_thin_avx2(const ThinTriangle<int32_t>& triangle, TileBricks& tile);

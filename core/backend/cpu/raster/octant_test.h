@@ -27,8 +27,8 @@
 namespace voxdag::cpu {
 
 // children[d][set] is the mask of the children in a set of columns along axis d. Each of the four
-// columns is two children long. Its bit in the set is its coordinate along axis d + 1 plus twice
-// its coordinate along axis d + 2 (axes modulo 3).
+// columns is two children long. The number of a column's bit in the set is the column's coordinate
+// along axis d + 1 plus twice its coordinate along axis d + 2 (axes modulo 3).
 struct ColumnTable {
   uint8_t children[3][16] = {};
   constexpr ColumnTable() {

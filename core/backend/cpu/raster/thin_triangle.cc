@@ -58,8 +58,9 @@ void ThinTriangle<Coordinate>::set_rows(const int64_t (&v)[3][3], const int64_t 
     const int64_t sign = this->normal[d] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const int64_t a = -half[q][i] * sign, b = half[p][i] * sign;
-      // A value of 0 counts as having the sign of the factor of the first axis or, if this factor
-      // is 0, of the other factor.
+      // The value of an edge's function at a row has no sign if it is 0. It then counts as having
+      // the sign of the factor of the first axis (in the order x, y, z) or, if this factor is 0, of
+      // the other factor.
       const int64_t first = p < q ? a : b, second = p < q ? b : a;
       const bool inside_at_zero = first != 0 ? first > 0 : second > 0;
       const Int c = static_cast<Int>(a) * (kHalfVoxel - v[p][i]) +

@@ -21,7 +21,8 @@
 
 namespace voxdag::cpu {
 
-// `lowest` and `width` of the base class are the values along the dominant axis.
+// `lowest` and `width` of the base class have the values of lowest_along and width_along for the
+// dominant axis.
 template <class Coordinate>
 struct ThinTriangle : TileTriangle<Coordinate> {
   using Int = typename TileTriangle<Coordinate>::Int;
@@ -29,8 +30,8 @@ struct ThinTriangle : TileTriangle<Coordinate> {
   Int lowest_along[3];
   Int width_along[3];  // -1 if the triangle is parallel to the axis
 
-  // Prepares a triangle. Returns false if it certainly sets no voxel of the tile. Returns false for
-  // all degenerate triangles.
+  // Prepares a triangle. Returns false if the triangle certainly sets no voxel of the tile, and for
+  // all degenerate triangles. `is_inside`: true if the triangle covers the tile (triangle_set.h).
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
  private:

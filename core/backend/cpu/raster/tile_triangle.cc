@@ -79,7 +79,7 @@ void TileTriangle<Coordinate>::set_edges(const int64_t (&v)[3][3], const int64_t
   constexpr int64_t kClamp = int64_t{1} << 60;
   for (int d = 0; d < 3; ++d) {
     const int p = (d + 1) % 3, q = (d + 2) % 3;
-    // If set_plane() has negated the half-edges, it has also negated the normal, and therefore
+    // If set_normal() has negated the half-edges, it has also negated the normal, and therefore
     // `sign`. So a and b are the same in both cases.
     const int64_t sign = normal[d] < 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {

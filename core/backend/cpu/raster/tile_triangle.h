@@ -51,7 +51,8 @@ struct TileTriangle {
   Int width;
   Edge edges[3][3];  // [projection][edge]
 
-  // Prepares a triangle. Returns false if it certainly touches no voxel of the tile.
+  // Prepares a triangle. Returns false if the triangle certainly touches no voxel of the tile.
+  // `is_inside`: true if the triangle covers the tile (triangle_set.h).
   bool set_up(const Triangle<Coordinate>& triangle, bool is_inside, const LatticeCube& tile);
 
  protected:

@@ -15,7 +15,7 @@ struct alignas(64) VoxelBlock {
 
 // Constants of block_key(), the hash of voxel blocks (hash family NH of Black et al., "UMAC",
 // 1999). block_key() adds a constant to each 32-bit half of a brick, multiplies the two halves, and
-// sums the products. Vectors of 32-bit lanes compute this as fast as they load the bricks.
+// sums the products. With vector instructions, this takes no longer than loading the bricks.
 struct BlockKeys {
   alignas(64) uint64_t add[kBlockBricks] = {};
   constexpr BlockKeys() {

@@ -24,8 +24,8 @@ class PlaneViews {
   PlaneViews(SolidRule rule, RunningRows& running) : rule_(rule), running_(running) {}
 
   // Reads the views at the low faces of a tile of 64^3 voxels. `f`: the plane's offset from the
-  // tile. `is_turned`: the triangle's normal is opposite to the plane's. Returns nothing if views
-  // of one side differ, or if only one of two inner sides is disputed.
+  // tile. `is_turned`: the triangle's normal is opposite to the plane's. Returns nullopt if views
+  // of one side differ, or if both sides are inside the solid but only one of them is disputed.
   std::optional<Sides> read(const Plane& plane, int64_t f, bool is_turned, const int (&tile)[3]);
   // Advances the views to the high faces of the tile of the last read().
   void advance();

@@ -19,8 +19,8 @@ class RunningRows {
   static constexpr int kRows = 9;  // maximum number of rows along an edge of a column's square
   static constexpr int kSquare = kRows * kRows;
 
-  // `tiles`: tiles along the subvolume's edge. `blocks`: blocks along a tile's edge, at most 8.
-  // `entry` holds the views of the subvolume's rows at its low faces. Throws OutOfBudget.
+  // `tiles`: number of tiles along the subvolume's edge. `blocks`: number of blocks along a tile's
+  // edge, at most 8. `entry` has the views at the subvolume's low faces. Throws OutOfBudget.
   RunningRows(PooledMemory& memory, const SolidEntry& entry, int tiles, int blocks);
 
   // Returns the views along `axis` at the low face of a column's next tile. `tile`: the position of
@@ -30,8 +30,9 @@ class RunningRows {
                     tile[second_row_axis(axis)]) *
                    size_t{kSquare}];
   }
-  // Returns the views of the corners of a cube that no triangle touches. `low` and `edge` are in
-  // tiles. The walk must have passed exactly the cube's own tiles and earlier ones.
+  // Returns the views from the corners of a cube that no triangle touches. `low` and `edge` are in
+  // tiles. Call it when all tiles up to the cube's last tile (in octree order) have been processed,
+  // and no later tile.
   UnitViews corners_of(const int (&low)[3], int edge);
 
  private:

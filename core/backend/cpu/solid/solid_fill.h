@@ -24,15 +24,15 @@ class SolidFill {
             SubDagTables& tables, FullNodes& full);
 
   // For a tile of 64^3 voxels whose only surface is a plane that covers it (PlaneViews): returns
-  // the plane's inner sides, or nothing if the tile needs the calls below. If the tile's node can
-  // be made with these sides, call pass_plane() with the number of filled voxels. `f` and
-  // `is_turned` are as for PlaneViews::read().
+  // the plane's inner sides; nullopt if the tile needs begin_tile(), add() and fill_tile(). If the
+  // tile's node can be made with these sides, call pass_plane() with the number of filled voxels.
+  // `f` and `is_turned` are as for PlaneViews::read().
   std::optional<PlaneViews::Sides> read_plane(const Plane& plane, int64_t f, bool is_turned,
                                               const LatticeCube& tile);
   void pass_plane(const PlaneViews::Sides& sides, uint64_t filled);
 
-  // For each other tile, in octree order, call begin_tile(), then add() for each triangle, and then
-  // fill_tile().
+  // For each tile without a call of pass_plane(), in octree order, call begin_tile(), then add()
+  // for each triangle, and then fill_tile().
   void begin_tile(const LatticeCube& tile);
   void add(const FixedTriangle& triangle) { views_.add(triangle); }
   // Fills the units (solid_rule.h) of the tile that are inside the solid. Leaves the blocks of
@@ -43,9 +43,9 @@ class SolidFill {
   // Returns a bit set of the tile's full voxel blocks, for TileReducer::reduce_bricks().
   const uint64_t* full_blocks() const { return filler_.full_blocks(); }
 
-  // Returns the views of a cube without voxels of the shell. The cube is at least as large as a
-  // tile. The tiles before the cube and in the cube must be finished, and no later tile may have
-  // begun.
+  // Returns the views from the corners of a cube that has no voxels of the shell and is at least as
+  // large as a tile. In octree order, the tiles before the cube and in the cube must be finished,
+  // and no later tile may have begun.
   UnitViews empty_cube(const LatticeCube& cube);
   // Returns the node of an empty cube that is a unit with the given views: the node of a full cube
   // if the unit is inside the solid, otherwise no node.

@@ -23,8 +23,8 @@ int cube_coordinate(int index, int axis) {
   return (bits & 1) | (bits >> 2 & 2) | (bits >> 4 & 4);
 }
 
-// Returns the sum of the signs of the triangle's crossings with the walk from `from` to `to` along
-// z, y and x.
+// Returns the sum of the signs of the triangle's crossings with the walk from `from` to `to`: first
+// along z, then along y, then along x.
 int64_t walk_crossings(const FixedTriangle& t, const int64_t (&from)[3], const int64_t (&to)[3]) {
   int64_t p[3] = {from[0], from[1], from[2]};
   int64_t sum = 0;

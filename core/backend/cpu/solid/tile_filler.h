@@ -28,7 +28,7 @@ struct FilledVoxels {
 
 class TileFiller {
  public:
-  // Calls its argument for each triangle of the tile.
+  // A function that calls its argument for each triangle of the tile.
   using ForEachTriangle = std::function<void(const std::function<void(const FixedTriangle&)>&)>;
 
   TileFiller(const Kernels& kernels, SolidRule rule, uint32_t grid_levels)
@@ -62,7 +62,7 @@ class TileFiller {
   // Returns the sum of the views from a corner of the block at the position `block` (in blocks).
   int32_t view_at(const int (&block)[3], int corner) const;
   // Adds to blind_ the components of `rest`, a set of empty voxels of the block with the number
-  // `index` and the position `low` (in blocks). Then `rest` is empty.
+  // `index` and the position `low` (in blocks). Makes `rest` empty.
   void add_blind(int index, const int (&low)[3], Slices& rest);
   void fill_blind();
 

@@ -34,7 +34,8 @@ class TileViews {
   UnitViews corners_of(const int (&low)[3], int edge) const;
 
  private:
-  // Adds the rows' views along an axis to the corners at position k of the axis.
+  // Adds the views along an axis, which are in `rows`, to the sums of the corners that are at
+  // position k along this axis.
   void add_views(int axis, int k, const int32_t* rows);
 
   SampleRows rows_;

@@ -47,7 +47,8 @@ struct HashBrick {
   }
 };
 
-// Returns the lowest bit that can be set in a truncated hash. Bits [64 - hash_bits, 64) can be set.
+// Returns the number of the lowest bit that can be set in a truncated hash. Bits [64 - hash_bits,
+// 64) can be set.
 inline int first_hash_bit(uint32_t hash_bits) { return 64 - static_cast<int>(hash_bits); }
 
 // Counts the children of each octree node in `items`. The prefix sums of these counts are the

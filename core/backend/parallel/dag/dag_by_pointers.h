@@ -1,7 +1,7 @@
 // The first DAG construction of Sintorn, "DAG Construction" (2018), after Kämpe, Sintorn and
 // Assarsson, "High Resolution Sparse Voxel DAGs" (2013). From the bottom up, the nodes of a level
 // are sorted by their (up to eight) child pointers, equal neighbors become one node, and the
-// pointers of their parents are replaced by the mapping
+// parents' pointers to these nodes are updated by the mapping
 //
 //     original index -> sorted index -> compact index
 //

@@ -62,7 +62,8 @@ uint32_t HostSpace::merge_runs(const uint64_t* keys, const uint64_t* masks, uint
     for (uint32_t i = begin; i < end; ++i) starts[p] += starts_run(i);
   });
   std::exclusive_scan(starts.begin(), starts.end(), starts.begin(), uint32_t{0});
-  // A part writes all runs of equal keys that start in it, even if they extend into later parts.
+  // The thread of a part writes all runs of equal keys that start in the part, even if they extend
+  // into later parts.
   for_parts(n, [&](size_t p, uint32_t begin, uint32_t end) {
     uint32_t at = starts[p], i = begin;
     while (i < end && !starts_run(i)) ++i;

@@ -99,8 +99,9 @@ struct StartPairs {
   }
 };
 
-// Finds the longest slice of sources, starting at `first`, that has at most `max_outputs` outputs.
-// Returns the end of the slice and the number of its outputs.
+// Finds the longest slice of sources (see expand() in space.h), starting at `first`, that has at
+// most `max_outputs` outputs. Writes the end of the slice and the number of its outputs to
+// `answer`.
 struct FindSlice {
   const uint32_t* offsets;
   uint32_t first, count, max_outputs;

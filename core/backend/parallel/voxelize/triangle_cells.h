@@ -118,7 +118,8 @@ struct TriangleOnLattice {
     return repeat_along<N>(axis == 2 ? 1 : 2, cells);
   }
 
-  // Returns the cells that the plane touches: cells with corners on both sides of it, or on it.
+  // Returns the cells of the group at `at` that the plane touches: cells with corners on both sides
+  // of the plane, or on it. The plane's value is clamped to [-far, far].
   template <int N, class Int>
   VOXDAG_HD uint64_t at_plane(const int (&at)[3], Int far) const {
     int128 here = plane;
@@ -139,7 +140,8 @@ struct TriangleOnLattice {
     return cells;
   }
 
-  // Returns the cells on the inner side of the three edges in the projection along axis c.
+  // Returns the cells of the group at `at` that touch the inner sides of all three edges, in the
+  // projection along axis c.
   template <int N>
   VOXDAG_HD uint64_t inside_edges(int c, const int (&at)[3]) const {
     const int a = c == 2 ? 0 : c + 1, b = c == 0 ? 2 : c - 1;

@@ -8,8 +8,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// Tables in the order in which a brick's 64 voxels are bytes of two vectors. Bit 5 of a voxel's
-// number selects the vector, and bit 4 selects the half of the vector.
+// Tables with an element for each of a brick's 64 voxels, as bytes of two vectors. Bit 5 of the
+// voxel's bit number (core/dag/brick.h) selects the vector, and bit 4 the half of the vector.
 template <int D>
 struct ByteOrder {
   alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number

@@ -106,7 +106,7 @@ class EdgeBounds {
     const __m256d half = _mm256_set1_pd(0.5);
     const __m256d slope = _mm256_mul_pd(across, inverse);
     const __m256d start = _mm256_mul_pd(_mm256_add_pd(lanes.c, half), inverse);
-    // -(1.5 / |up| + (1 + |slope|) / 2)
+    // For widened(): -(1.5 / |up| + (1 + |slope|) / 2).
     const __m256d reach = _mm256_sub_pd(
         _mm256_mul_pd(inverse, _mm256_set1_pd(1.5)),
         _mm256_mul_pd(half, _mm256_add_pd(_mm256_set1_pd(1.0), _mm256_andnot_pd(sign, slope))));

@@ -79,8 +79,8 @@ struct Footprint {
   static VOXDAG_INLINE void store(uint16_t (&row)[16], __m256i bits) {
     _mm256_store_si256(reinterpret_cast<__m256i*>(row), bits);
   }
-  // Converts the bounds of four rows to shift counts, at most 64. Shifting a row by this count
-  // clears the voxels outside the bound.
+  // Converts a bound (edge_bounds.h) of each of four rows to a shift count, at most 64. Shifting
+  // the row's 64 bits by this count clears the voxels outside the bound.
   static VOXDAG_INLINE __m256i count(__m256d x) {
     return _mm256_cvtepi32_epi64(_mm256_cvttpd_epi32(_mm256_min_pd(x, _mm256_set1_pd(64.0))));
   }
@@ -91,8 +91,8 @@ struct Footprint {
   // Converts four rows of 64 voxels to bytes. The lower half of the result has a byte for each of
   // the 16 bricks, with the voxels of the brick in the first two rows. The upper half has the same
   // for the other two rows. A byte of a row has four voxels of one brick, then four voxels of the
-  // next brick. So a pair of bytes from two rows has four nibbles, and the middle two are
-  // exchanged.
+  // next brick. So a pair of bytes from two rows has four nibbles, and this function exchanges the
+  // middle two.
   static VOXDAG_INLINE __m256i bytes_of_bricks(__m256i rows) {
     const __m256i pairs = interleaved(rows);
     const __m256i differ = _mm256_and_si256(_mm256_xor_si256(pairs, _mm256_srli_epi16(pairs, 4)),

@@ -48,8 +48,8 @@ VOXDAG_INLINE int64_t magnitude(int64_t a) { return a < 0 ? -a : a; }
 template <int D>
 class Heights {
  public:
-  // The plane touches the voxels k with 0 <= normal.k + lowest <= width. `normal` must outlive this
-  // object.
+  // Prepares the test for the plane that touches the voxels k with 0 <= normal.k + lowest <= width.
+  // `normal` must outlive this object.
   VOXDAG_INLINE Heights(const int64_t (&normal)[3], int64_t lowest, int64_t width)
       : normal_(normal), lowest_(lowest), width_(width) {
     const int64_t np = normal[P], nq = normal[Q];
@@ -89,8 +89,8 @@ class Heights {
             static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
   }
 
-  // Converts a column of bricks of another plane with the same normal: replaces `within` by this
-  // plane's value. This plane's height must be at most half a voxel above the other plane's height.
+  // Converts `c`, a Column of another plane with the same normal: replaces `within` by this plane's
+  // value. This plane's height must be at most half a voxel above the other plane's height.
   VOXDAG_INLINE Column in_bricks_of(Column c) const {
     c.within = static_cast<int>(height_of(c.p, c.q) >> (kColumnBits - kHeightBits)) -
                c.brick * (4 << kHeightBits);

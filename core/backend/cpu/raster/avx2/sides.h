@@ -24,8 +24,9 @@ namespace {
 using HeightBounds = __m256i;
 constexpr int kMaxHeight = 15;
 
-// Byte indexes that copy the bounds of a row of bricks, four from below and four from above, to the
-// 16 voxel columns. byte[1] is for bounds that depend on p, byte[0] for bounds that depend on q.
+// Byte indexes for a shuffle that copies the bounds of a row of bricks (first four lower bounds,
+// then four upper bounds) to the 16 voxel columns. byte[1] is for bounds that depend on p, byte[0]
+// for bounds that depend on q (tile_columns.h).
 struct SideOrder {
   alignas(32) uint8_t byte[2][32] = {};
   constexpr SideOrder() {
@@ -70,7 +71,7 @@ class Sides {
   VOXDAG_INLINE HeightBounds bounds(int p, int q, int brick) const {
     return from_floor(_mm256_max_epu8(by_q_[q], by_p_[p]), brick);
   }
-  // Return the bounds from one projection only.
+  // The next two functions return the bounds from one projection only.
   VOXDAG_INLINE HeightBounds bounds_of_q(int q, int brick) const {
     return from_floor(by_q_[q], brick);
   }

@@ -19,7 +19,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// The plane test and the edge tests along one axis other than D, as bounds of the heights.
+// The tests of a triangle along an axis other than D (thin_triangle.h): finds the voxel columns in
+// which a voxel passes both the plane test and the edge tests along this axis.
 template <int D>
 class SideCrossings {
  public:

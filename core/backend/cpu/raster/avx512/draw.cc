@@ -12,8 +12,8 @@ namespace {
 // Tables indexed by the voxel of a brick.
 template <int D>
 struct VoxelBytes {
-  // Byte indexes in HeightBounds (sides.h) of the lower bound (`below`) and the upper bound
-  // (`over`) of the voxel's column.
+  // For each voxel of a brick: the byte indexes in HeightBounds (sides.h) of the lower bound
+  // (`below`) and the upper bound (`over`) of its voxel column.
   alignas(64) uint8_t below[64] = {};
   alignas(64) uint8_t over[64] = {};
   alignas(64) uint8_t height[4][64] = {};  // height above the floor of the first of four bricks
