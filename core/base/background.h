@@ -11,9 +11,10 @@
 
 namespace voxdag {
 
-// Starts `work` on a new thread. get() of the returned future rethrows an exception of `work`, and
-// its destructor waits for the thread. If the system cannot start another thread, the first call of
-// get() or wait() runs `work` on the calling thread; without such a call, `work` never runs.
+// Starts `work` on a new thread. get() of the returned future rethrows an exception of `work`. The
+// future's destructor waits for the thread. If the system cannot start another thread, the first
+// call of the future's get() or wait() runs `work` on the calling thread. `work` then never runs if
+// neither function is called.
 template <class Work>
 [[nodiscard]] std::future<void> run_in_background(Work&& work) {
   const auto shared = std::make_shared<std::decay_t<Work>>(std::forward<Work>(work));

@@ -16,7 +16,7 @@ inline double clock_seconds(clockid_t clock) {
   clock_gettime(clock, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
-// Returns the seconds since an arbitrary start. The time never goes back.
+// Returns the seconds since an arbitrary but fixed time. The clock never goes back.
 inline double wall_seconds() { return clock_seconds(CLOCK_MONOTONIC); }
 // Returns the seconds since 1970-01-01 UTC.
 inline double unix_seconds() { return clock_seconds(CLOCK_REALTIME); }
@@ -25,9 +25,9 @@ inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME
 // Returns the user and system time of the calling thread, in seconds.
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
-// CPU time of each thread, which shows whether a stage keeps all threads busy. A thread adds its
-// time when it ends. All threads that parallel_for() started with the same worker number share one
-// entry, and all background threads share another.
+// The CPU times of this process's threads, which show whether a stage keeps all threads busy. A
+// thread adds its time when it ends. There is one entry for each worker number of parallel_for(),
+// which its threads in all calls share, and one entry that all background threads share.
 class ThreadTimes {
  public:
   static constexpr size_t kThreads = 257;  // entries: workers 0 to 255, and background threads
@@ -38,7 +38,7 @@ class ThreadTimes {
   // above 255 share the entry of worker 255.
   static void add(size_t worker) { times_ns_[std::min(worker, kBackground - 1)] += now_ns(); }
   static void add_background() { times_ns_[kBackground] += now_ns(); }
-  // Returns the seconds of each entry so far. Entry 0 includes the time of the calling thread.
+  // Returns the CPU seconds of each entry so far. Entry 0 also includes the calling thread's time.
   static Seconds now() {
     Seconds seconds;
     for (size_t i = 0; i < kThreads; ++i) seconds[i] = 1e-9 * static_cast<double>(times_ns_[i]);

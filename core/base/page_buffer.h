@@ -53,9 +53,9 @@ class PageBuffer {
     if (data_) free_pages(data_, size_ * sizeof(T));
   }
 
-  // Enlarges a buffer that is not empty to `size` elements. The new elements are zero. Throws an
-  // Error{kOutOfMemory} that names `what` if the new size does not fit; the buffer is then
-  // unchanged.
+  // Enlarges the buffer, which must not be empty, to `size` elements. The new elements are zero.
+  // Throws an Error{kOutOfMemory} that names `what`, the purpose of the buffer, if the new size
+  // does not fit; the buffer is then unchanged.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
     if (!charge_.try_resize(byte_count(size)))
@@ -81,8 +81,8 @@ class PageBuffer {
   T* end() { return data_ + size_; }
 
  private:
-  // Returns the bytes of `size` elements, or UINT64_MAX, which never fits a budget, if the product
-  // overflows.
+  // Returns the number of bytes in `size` elements. If this number overflows, returns UINT64_MAX,
+  // which exceeds every budget.
   static uint64_t byte_count(size_t size) {
     return size <= SIZE_MAX / sizeof(T) ? size * sizeof(T) : UINT64_MAX;
   }

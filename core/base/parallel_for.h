@@ -49,7 +49,7 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       threads.emplace_back(work_and_end, worker);
   } catch (const std::exception&) {
-    // The system has no more threads. The threads started so far and the caller do all the work.
+    // The system refused to start a thread. The threads started so far and the caller do all work.
   }
   work(0);
   for (std::thread& thread : threads) thread.join();

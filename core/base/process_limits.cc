@@ -38,8 +38,8 @@ uint64_t min_up_from(const std::string& root, std::string path, const LimitOf& l
 
 // Returns the lowest limit of all cgroups in `membership` (the text of /proc/self/cgroup) and of
 // their ancestors. limit_of2() and limit_of1() read the limit from a cgroup's folder, for version 2
-// and version 1 of cgroups. A line of `membership` is "<id>:<controllers>:<path>". In version 2,
-// <controllers> is empty.
+// and version 1 of cgroups. `controller` is "memory" or "cpu"; only version 1 needs it. A line of
+// `membership` is "<id>:<controllers>:<path>". In version 2, <controllers> is empty.
 template <class LimitOf2, class LimitOf1>
 uint64_t min_of_groups(const std::string& membership, const std::string& mount,
                        const std::string& controller, const LimitOf2& limit_of2,
@@ -110,7 +110,7 @@ constexpr ErrnoCode kCodes[] = {
     {ENAMETOOLONG, ErrorCode::kInvalidInput},
 };
 
-// A limit of processes that makes system calls fail with `reason`.
+// A limit of a process. System calls that would exceed it fail with the errno value `reason`.
 struct ProcessLimit {
   int reason;
   __rlimit_resource resource;
@@ -127,7 +127,8 @@ constexpr ProcessLimit kLimits[] = {
     {ENOMEM, RLIMIT_DATA, "data memory, ulimit -d,", true},
 };
 
-// Returns the limits of this process that can cause `reason`: " (the limit of ... is ...)", or "".
+// Returns the limits of this process that can cause the errno value `reason`, as text: " (the limit
+// of ... is ...)". Returns "" if no limit can cause it.
 std::string limits_text(int reason) {
   std::string text;
   for (const ProcessLimit& limit : kLimits) {
@@ -159,7 +160,8 @@ uint64_t cgroup_cpus(const std::string& membership, const std::string& mount) {
         return file >> quota >> period ? cpus(quota, period) : UINT64_MAX;
       },
       [](const std::string& folder) {
-        // A quota of -1 means no quota. Read as an unsigned number, it exceeds all limits.
+        // A quota of -1 means no quota. Read as an unsigned number, it is UINT64_MAX, for which
+        // cpus() returns UINT64_MAX.
         return cpus(number_in(folder + "cpu.cfs_quota_us"),
                     number_in(folder + "cpu.cfs_period_us"));
       });

@@ -13,8 +13,8 @@
 #include "voxdag/error.h"
 
 // VOXDAG_SANITIZED is 1 if the address or thread sanitizer instruments this code, and 0 otherwise.
-// Sanitizers reserve terabytes of address space, retain freed memory and handle signals. g++
-// defines macros for them; clang has __has_feature.
+// Some code and tests need to know this, because sanitizers reserve terabytes of address space,
+// retain freed memory and handle signals. g++ defines macros for them; clang has __has_feature.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define VOXDAG_SANITIZED 1
 #elif defined(__has_feature)
@@ -58,8 +58,8 @@ ErrorCode code_of_errno(int reason);
 std::string errno_text(int reason);
 // Returns the error for a memory allocation that the system refused (std::bad_alloc).
 Error out_of_memory_error();
-// Returns the error for an exception of the standard library. The system reports with EAGAIN that
-// it cannot start another thread; the code is then kOutOfMemory.
+// Returns the Error for an exception of the standard library. The code is kOutOfMemory for EAGAIN,
+// with which the system reports that it cannot start another thread.
 Error error_of(const std::system_error& error);
 
 // Makes the C library return freed memory to the system immediately, so that resident memory

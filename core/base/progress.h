@@ -44,14 +44,14 @@ class Progress {
   // unknown. `unit` is the plural name of a unit ("triangles", "subvolumes", "nodes").
   virtual void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) = 0;
   // Reports that an earlier run has done `done` units of the stage. They count toward the total,
-  // but not toward the displayed rate. If it is called, it is called after begin_stage().
+  // but not toward the displayed rate. A stage that resumes calls this after begin_stage().
   virtual void resume_at(uint64_t done) = 0;
   // Reports that `count` more units are done.
   virtual void advance(uint64_t count) = 0;
   // Reports a total that became known or has changed, for example because a subvolume was split.
   virtual void set_total(uint64_t total) = 0;
   virtual void end_stage() = 0;
-  // Reports a warning that a user should read: one sentence.
+  // Reports a warning that a user should read. `message` is one sentence.
   virtual void warn(std::string_view message) = 0;
   // Reports a warning about the input. Throws Error{kInvalidInput} if the command treats these
   // warnings as errors.

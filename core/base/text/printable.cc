@@ -49,7 +49,8 @@ bool is_printable_code(char32_t code) {
   });
 }
 
-// Copies the text. Calls replace(out, character) for characters for which keeps(code) is false.
+// Returns the text with some characters replaced: for each character for which keeps(code) is
+// false, calls replace(out, character), which appends the replacement to `out`.
 template <class Keeps, class Replace>
 std::string converted(std::string_view text, const Keeps& keeps, const Replace& replace) {
   std::string out;
@@ -92,7 +93,8 @@ std::string printable_lines(std::string_view text) {
 }
 
 std::string printable_json(std::string_view json) {
-  // Below U+0020, JSON text has only white space. The strings in it have escapes already.
+  // Keeps characters below U+0020. They are white space between the values of the JSON, because
+  // within strings such characters are already escaped.
   const auto keeps = [](char32_t code) { return code < 0x20 || is_printable_code(code); };
   return converted(json, keeps, [](std::string& out, const Character& character) {
     char escape[16];
