@@ -135,7 +135,7 @@ static_assert([] {
 constexpr const char* name_of(Attribute attribute) { return traits_of(attribute).name; }
 
 // Returns the bytes per value in the global file, for attributes other than color. `names` is the
-// length of the list of names.
+// length of the list of names, which only attributes of the encoding kNameIndex have.
 constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   const uint32_t block_bytes = traits_of(traits_of(attribute).encoding).block_bytes;
   if (block_bytes > 0) return block_bytes / 32;

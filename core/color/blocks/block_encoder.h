@@ -115,8 +115,8 @@ class BlockEncoder {
     out.range = high - low;
   }
 
-  // Sets `axis` to `from`, shortened to components of at most 10 bits that are rounded toward 0.
-  // Returns false if `from` is zero; `axis` is then unchanged.
+  // Sets `axis` to `from`, divided by a power of two so that no component has more than 10 bits,
+  // and rounded toward 0. Returns false if `from` is zero; `axis` is then unchanged.
   VOXDAG_INLINE static bool normalize(const int64_t (&from)[3], int32_t (&axis)[3]) {
     uint64_t largest = 0;
     for (const int64_t f : from) largest |= static_cast<uint64_t>(f < 0 ? -f : f);

@@ -24,7 +24,7 @@ struct ValuedCell {
 EncodedRegion encode_values(Attribute attribute, uint32_t bytes, uint32_t levels, uint64_t morton,
                             std::span<const ValuedCell> cells);
 
-// Returns the value of the `i`-th cell in blocks of values.
+// Returns the value of the `i`-th cell in blocks of values of `bytes` bytes each.
 inline uint32_t value_at(const std::byte* blocks, uint64_t i, uint32_t bytes) {
   uint32_t value = 0;
   for (uint32_t b = bytes; b-- > 0;)

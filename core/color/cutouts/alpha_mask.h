@@ -44,7 +44,7 @@ class AlphaMask {
  private:
   struct Level {
     uint32_t width, height, row_words;
-    size_t any, all;  // where the two sets of bits begin in words_; equal in the finest level
+    size_t any, all;  // start of the two sets of bits in words_; the finest level has only one set
   };
 
   bool bit(size_t first, uint32_t level, uint32_t x, uint32_t y) const {

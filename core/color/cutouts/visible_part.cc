@@ -30,8 +30,8 @@ std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {
   return low;
 }
 
-// Maps `texel`, a coordinate (in texels) within a period, to the coordinate in the image. A period
-// is one repetition of the image; period 0 begins at coordinate 0.
+// Maps the coordinate `texel` (in texels) to a coordinate in the image. `period` is the number of
+// the repetition of the image that contains `texel`; repetition 0 begins at coordinate 0.
 double in_image(double texel, double period, double size, Wrap wrap) {
   const double at = texel - period * size;
   const bool is_mirrored = wrap == Wrap::kMirroredRepeat && std::fmod(period, 2) != 0;
@@ -122,8 +122,9 @@ VisiblePart::Sight VisiblePart::sight(const Cube& cube) const {
   return sight_of(part_in(low_corner(cube, grid_levels_), edge, kCubeMargin));
 }
 
-// Returns whether all, none or some of the texels in the polygon's box are visible. Tests blocks of
-// the first level at which the box is at most five blocks wide.
+// Returns kVisible if all texels in the polygon's box are visible, kHidden if none are, and
+// otherwise kMixed. Tests the blocks of the finest level (alpha_mask.h) at which the box is at most
+// five blocks wide and high.
 VisiblePart::Sight VisiblePart::sight_of(const Polygon& polygon) const {
   if (polygon.count == 0) return Sight::kMixed;
   Range range[2];
@@ -200,8 +201,8 @@ bool VisiblePart::covers(const Polygon& polygon, bool visible, double depth) con
   return false;
 }
 
-// Returns the outline of a polygon in one repetition of the image. `period` has the repetition's
-// numbers along u and v.
+// Returns the outline of a polygon relative to one repetition of the image, in the coordinates of
+// the image's texels. `period` has the repetition's numbers along u and v.
 VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
                                              const std::array<double, 2>& period) const {
   Outline out;
@@ -231,9 +232,9 @@ VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
   return out;
 }
 
-// Returns the smallest block that contains the polygon and a margin around it, or the block of the
-// last level. covers() returns the same for any larger block that contains this one, because
-// covers() never finds a gap between the polygon and a block that contains the polygon.
+// Returns the smallest block that contains the polygon and a margin around it; the block of the
+// last level if no block does. covers() has the same result for this block as for all larger blocks
+// that contain it, because the polygon does not reach the other parts of those blocks.
 VisiblePart::Block VisiblePart::block_around(const Outline& outline) const {
   const uint32_t size[2] = {mask_->width(), mask_->height()};
   uint32_t first[2], last[2];

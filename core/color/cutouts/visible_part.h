@@ -7,7 +7,7 @@
 // visible texel. To cover a texel, the polygon must reach at least 2^-16 of a texel's edge into the
 // square. So a polygon that ends at the border of a texel does not cover the texel. If the polygon
 // covers no texel at all, the triangle is visible in the voxel if the polygon touches a visible
-// texel. All values are computed in IEEE doubles, in the order written here.
+// texel. All values are computed in IEEE doubles, in the order of the code.
 //
 // For a larger cube, the texels in a box around the cube's polygon, slightly enlarged, are a quick
 // test: if all are visible (or none), the triangle is visible in all of the cube's voxels (or

@@ -83,7 +83,7 @@ bool VisiblePatches::descend(const Source& source, const Cube& cube, bool is_vis
   return true;
 }
 
-// Marks the visible voxels of a cube. The cube is a block or a part of a block.
+// Marks the visible voxels of a cube in rows_. The cube is a block (64^3 voxels) or a part of one.
 void VisiblePatches::mark_visible(const Source& source, const Cube& cube, bool is_visible) {
   if (!is_visible) {
     const Sight sight = source.part.sight(cube);
@@ -112,7 +112,7 @@ void VisiblePatches::mark(const Voxel& voxel) {
   last_row_ = std::max(last_row_, row);
 }
 
-// Visits the patches of the block whose low corner is `low`, and clears the rows.
+// Visits the patches of the block whose low corner is `low`, and clears rows_.
 bool VisiblePatches::visit_rows(const Voxel& low, const Visit& visit) {
   bool is_complete = true;
   for (size_t row = first_row_; row <= last_row_; ++row)

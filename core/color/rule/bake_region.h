@@ -81,8 +81,9 @@ class RegionBaker {
       last_[a] = first_[a] + (int64_t{1} << down) - 1;
     }
   }
-  // Returns false if the region now has more than `max_cells` cells, at most kTriangleCells more.
-  // finish() must still be called in this case, but its result is incomplete.
+  // Returns false if the region now has more than `max_cells` cells; it then has at most max_cells
+  // + kTriangleCells cells. finish() must still be called in this case, but its result is
+  // incomplete.
   bool add(std::span<const FixedSurface> triangles) {
     triangles_ = triangles;
     for (uint32_t i = 0; i < triangles.size() && cells_.count() <= max_cells_; ++i) add_triangle(i);
@@ -274,7 +275,8 @@ class RegionBaker {
   }
 
   bool has_mask(uint32_t material) const { return cutouts_ && cutouts_->mask(material); }
-  // Returns the visible part of a surface, if it may be cut out.
+  // Returns the visible part of a surface; nullopt if the complete surface is visible, because its
+  // material is opaque or there are no cutouts.
   std::optional<VisiblePart> visible_part(const FixedSurface& surface) const {
     if (!cutouts_ || !cutouts_->may_cut(surface.material)) return std::nullopt;
     return VisiblePart(surface, *cutouts_, grid_.levels);

@@ -76,7 +76,8 @@ VOXDAG_HD inline double area_of(const FixedTriangle& triangle) {
 
 template <class Int>
 struct CellTriangle {
-  // The function of an edge in a projection: a x + b y + base, in lattice units; >= 0 inside.
+  // The function of an edge in a projection: a x + b y + base. The coordinates x and y are in
+  // lattice units. The function is >= 0 inside the triangle.
   struct Edge {
     Int a, b, base;
     // The maximum of the function over the closed cell (p, q) is >= 0 iff a p + b q + touch >= 0.

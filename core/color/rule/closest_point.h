@@ -1,6 +1,6 @@
 // The point of a triangle that is closest to a cell's center, for cells in which no triangle covers
-// a column. Computed in IEEE doubles, in the order written here: the exact position matters little,
-// but all machines must agree.
+// a column. Computed in IEEE doubles, in the order of the code: the exact position matters little,
+// but it must be the same on all machines.
 #pragma once
 
 #include <array>

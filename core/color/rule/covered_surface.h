@@ -49,9 +49,10 @@ class CoveredSurface {
   }
 
  private:
-  // Returns the exact sum of the function of edge i over `count` columns, whose coordinates P and Q
-  // add up to sum_p and sum_q. Divided by `count` and by the normal's component 2, the sum is the
-  // mean weight (barycentric coordinate) of the vertex opposite to the edge.
+  // Returns the exact sum of the function of edge i (CellTriangle::Edge) over `count` columns,
+  // whose coordinates P and Q add up to sum_p and sum_q. Divided by `count` and by the normal's
+  // component 2, the sum is the mean weight (barycentric coordinate) of the vertex opposite to the
+  // edge.
   VOXDAG_HD Int sum_of(int i, Int sum_p, Int sum_q, Int count) const {
     const auto& e = t_.edges[2][i];
     const Int quarters = wrapping_sum(wrapping_product(e.a, sum_p), wrapping_product(e.b, sum_q));

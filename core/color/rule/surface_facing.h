@@ -10,14 +10,15 @@
 
 namespace voxdag::color {
 
-// The integer that stands for the area of one column, in the projection along the triangle's
-// dominant axis.
+// The integer that stands for the cross section of one column, which is 1/16 of a cell's face, in
+// the components of SurfaceFacing::area.
 inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.
 struct SurfaceFacing {
-  // A vector along the triangle's normal. Its length is the triangle's area in one covered column,
-  // so its dominant component has the magnitude kColumnArea. All 0 for a triangle without area.
+  // A vector along the triangle's normal. Its length is the area of the triangle's part in one
+  // covered column, so the magnitude of its dominant component, the area of the part's projection,
+  // is kColumnArea. All 0 for a triangle without area.
   int64_t area[3] = {};
   bool is_backward = false;  // the normal's dominant component is negative
   uint32_t material = 0;
@@ -39,8 +40,8 @@ VOXDAG_HD inline void set_area(const FixedTriangle& triangle, SurfaceFacing& fac
   facing.is_backward = n[dominant] < 0;
 }
 
-// Returns the contribution of a triangle. `material` is the index of its material in the list of
-// names.
+// Returns the contribution of a triangle. `material` is the index of the name of its material
+// (Material::number).
 VOXDAG_HD inline SurfaceFacing facing_of(const FixedSurface& surface, uint32_t material) {
   SurfaceFacing facing;
   facing.material = material;

@@ -35,10 +35,13 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
 }
 
 // Returns the level of the image's pyramid that has one to two texels along the edge of a color
-// cell, on average over the triangle: the largest l with 4^l <= texels in the triangle / its area
-// in cells. `area`: twice the triangle's area, in square lattice units. A triangle without area is
-// treated as a square whose side is the triangle's longest edge, or a lattice unit if all edges
-// have the length 0. All values are computed in IEEE doubles, in the order written here.
+// cell, on average over the triangle. This is the largest existing level l with 4^l <= t / c, where
+// t is the number of texels of level 0 in the triangle, and c is the triangle's area in square
+// color cells.
+//
+// `area` is twice the triangle's area in square lattice units (1/256 voxel). If it is 0, t and c
+// are the squares of the longest edge in texels and of the longest edge in cells, which has at
+// least one lattice unit. All values are IEEE doubles, computed in the order of the code below.
 template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {
@@ -127,8 +130,8 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 template <class Textures>
 class SurfaceLook {
  public:
-  // `is_cut` is true if the material has a mask (Cutouts). The colors in its image are then
-  // multiplied by alpha.
+  // `is_cut` is true if the material has a mask (Cutouts). The colors in the material's image are
+  // then already multiplied by alpha.
   VOXDAG_HD SurfaceLook(const FixedSurface& surface, const Material& material, Textures& textures,
                         int cell_bits, double area, bool is_cut = false)
       : corners_(surface.corners.data()),

@@ -87,7 +87,7 @@ class TouchedCells {
     lowest_ = wrapping_sum(wrapping_sum(at_cell, t_.plane_ceil), fall_);
     correct();
   }
-  // Updates first_, last_, highest_ and lowest_, which are for the previous column of cells in the
+  // Updates first_, last_, highest_ and lowest_ from one column of cells to the next column in the
   // row.
   VOXDAG_HD void climb() {
     if (t_.degenerate) return;

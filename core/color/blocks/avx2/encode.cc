@@ -1,4 +1,5 @@
-// This file is compiled for AVX2, so its code for blocks must not run before the CPU was checked.
+// This file is compiled for AVX2, so its functions may run only after a check that the CPU has
+// AVX2.
 #include "core/color/blocks/block_encoder.h"
 
 namespace voxdag {
