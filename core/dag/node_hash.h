@@ -19,7 +19,7 @@ VOXDAG_HD inline uint64_t hash_brick(uint64_t mask) {
   return h ^ h >> 32;
 }
 
-// Compute the hash of a node step by step. Call node_hash_begin() with the child mask,
+// The next three functions compute the hash of a node. Call node_hash_begin() with the child mask,
 // node_hash_add() for the hash of each child in child order, then node_hash_end(). Each call takes
 // the result of the previous call as `state`.
 VOXDAG_HD inline uint64_t node_hash_begin(uint32_t child_mask) {

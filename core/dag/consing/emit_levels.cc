@@ -3,7 +3,7 @@
 //   1. Replace the child ids in the level's records by the children's positions in the array of the
 //      level below. This pass visits the records in the order in which they were added, which is
 //      also their order in memory.
-//   2. Sort the slots of the level's hash table (node_table.h) in the total order.
+//   2. Sort the slots of the level's hash table (node_table.h) in the total order (level_array.h).
 //   3. Copy the records to the level's array in the order of the slots. Store in each record its
 //      position in the array, for pass 1 of the level above.
 #include <algorithm>

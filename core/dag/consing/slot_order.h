@@ -21,8 +21,9 @@ inline uint64_t slots_for(uint64_t entries) {
 }
 
 // Moves the used slots to the front and returns them. Their order does not change, with one
-// exception: entries with the highest hashes that linear probing has put into the first slots are
-// moved behind all others. `tag(slot)` is the upper half of the hash.
+// exception. If the last slots were taken, linear probing has put entries with the highest hashes
+// into the first slots. These entries are moved behind all others. `tag(slot)` is the upper half of
+// the hash.
 template <class Slot, class InUse, class Tag>
 std::span<Slot> compact_slots(std::span<Slot> slots, InUse in_use, Tag tag) {
   std::vector<Slot> wrapped;

@@ -14,7 +14,7 @@ namespace voxdag {
 inline constexpr int kFaces = 6;
 inline constexpr uint8_t kAllFaces = (1 << kFaces) - 1;
 
-// Returns the faces of a cube that are on the surface of its parent.
+// Returns the set of an octant's faces that are on the surface of the octant's parent.
 constexpr uint8_t outer_faces(int octant) {
   uint8_t faces = 0;
   for (int a = 0; a < 3; ++a)

@@ -180,9 +180,9 @@ class NeighborFilter {
     for (size_t n = 0; n < kNeighbors; ++n) nodes_.children(depth, cubes[n], children[n]);
     NodeRef octants[8];
     for (uint32_t o = 0; o < 8; ++o) {
-      // Neighbor n of octant o is octant o ^ n of a cube. This cube is another one than the
-      // octant's along those axes of n on which the step to the neighbor leaves the octant's cube:
-      // the axes in `leaves & n`.
+      // The neighbor n of octant o is the octant o ^ n of the same cube or of a neighboring cube.
+      // Along the axes in `leaves & n`, the step to the neighbor leaves the cube. So the neighbor
+      // is in the cube's neighbor `leaves & n` (0: in the same cube).
       const uint32_t leaves = filter_ == WalkFilter::kBlocked ? o : ~o;
       Neighborhood around;
       for (uint32_t n = 0; n < kNeighbors; ++n) around[n] = children[leaves & n][o ^ n];
@@ -191,9 +191,12 @@ class NeighborFilter {
     return tables_.add_node(size_log2(depth), octants);
   }
 
-  // spread() combines the voxels in p + [0, V]^3, where V is the radius. A voxel x is enclosed if
-  // no position in x - [0, V]^3 is open. With p = x - V, these are the positions in p + [0, V]^3.
-  // So the result for x is at x - V: it begins at `low`.
+  // Computes the result for cubes of the smallest size with a tile of 2 x 2 x 2 cubes. spread()
+  // sets p if any voxel in p + [0, V]^3 is set, where V is the radius. Blocked positions are
+  // exactly these p. For enclosed voxels, the set voxels of the tile are the open positions. A
+  // voxel x is enclosed if no position in x - [0, V]^3 is open. These positions are p + [0, V]^3
+  // with p = x - V. So the result for voxel x is at x - V in the tile, and the result begins at
+  // `low`.
   NodeRef filter_tile(int depth, const Neighborhood& cubes) {
     const int edge = 1 << base_log2_;
     const bool is_blocked = filter_ == WalkFilter::kBlocked;

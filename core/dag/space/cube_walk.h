@@ -46,14 +46,15 @@ int smallest_filtered(uint32_t radius);
 // octants. `is_higher` is true if the neighbors have larger coordinates than the cube.
 uint8_t octants_near(int n, bool is_higher);
 
-// Adds the blocked positions in a cube of 2^size_log2 voxels per edge to `tables`, and returns
-// their root. `shell` has the set voxels of the cube and of its neighbors with larger coordinates.
-// Throws OutOfBudget.
+// Adds a sub-DAG whose voxels are the blocked positions in a cube of 2^size_log2 voxels per edge to
+// `tables`, and returns its root. `shell` has the set voxels of the cube and of its neighbors with
+// larger coordinates. Throws OutOfBudget.
 NodeRef add_blocked(PooledMemory& memory, const CubeNeighbors& shell, int size_log2,
                     uint32_t radius, SubDagTables& tables);
 
-// Adds the enclosed voxels in a cube to `tables`, and returns their root. `closed` has the closed
-// positions in the cube and in its neighbors with smaller coordinates. Throws OutOfBudget.
+// Adds a sub-DAG of the enclosed voxels in a cube to `tables`, and returns its root. The voxels of
+// `closed` are the closed positions in the cube and in its neighbors with smaller coordinates.
+// Throws OutOfBudget.
 NodeRef add_enclosed(PooledMemory& memory, const CubeNeighbors& closed, int size_log2,
                      uint32_t radius, SubDagTables& tables);
 

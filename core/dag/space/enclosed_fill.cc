@@ -9,7 +9,8 @@
 namespace voxdag {
 namespace {
 
-// A node, the set of its components that are outside, and the node that replaces it.
+// A node, the set of its components (space_labels.h) that are outside, and the node with which the
+// fill replaces it.
 struct FilledNode {
   uint64_t outside = 0;  // bit c: component c is outside
   uint64_t hash = 0;
@@ -56,7 +57,7 @@ class FilledNodes {
 
 class Filler {
  public:
-  // If `keeps_closed` is true, closed components remain empty.
+  // If `keeps_closed` is true, closed components (space_labels.h) remain empty.
   Filler(PooledMemory& memory, const SpaceLabels& labels, bool keeps_closed, SubDagTables& tables)
       : memory_(memory),
         labels_(labels),
@@ -70,8 +71,8 @@ class Filler {
     fill(0, {true, 0, 0});
   }
 
-  // Also fills the component that contains the voxel `seed`, if this component is closed. `labels`
-  // are this object's labels.
+  // Like run(is_outside), but also fills the component that contains the voxel `seed`, if this
+  // component is closed. `labels` must be the labels that were passed to the constructor.
   void run(std::span<const uint8_t> is_outside, SpaceLabels& labels, const CubeVoxel& seed) {
     const SeedPlace place = find_seed(labels, seed);
     if (place.kind != SeedPlace::Kind::kClosed) return run(is_outside);

@@ -19,8 +19,8 @@ namespace voxdag {
 void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
                    std::span<const uint8_t> is_outside, SubDagTables& tables);
 
-// Like fill_enclosed(), but leaves components without a voxel at the faces of the root's cube
-// empty, except the component of `seed`, if it is one of them.
+// Like fill_enclosed(), but does not fill components that have no voxel at the faces of the root's
+// cube. If the voxel `seed` is in such a component, this component is filled nevertheless.
 void fill_from_seed(PooledMemory& memory, SpaceLabels& labels, std::span<const uint8_t> is_outside,
                     const std::optional<CubeVoxel>& seed, SubDagTables& tables);
 

@@ -86,8 +86,8 @@ class FaceEncoder {
   const int face_;
   const uint64_t max_bytes_;
   std::vector<std::byte>& out_;
-  std::vector<uint32_t> numbers_;  // the root's component that contains each component of the cubes
-                                   // on the path
+  std::vector<uint32_t> numbers_;  // for each component of the cubes on the path: the component of
+                                   // the root that contains it
 };
 
 [[noreturn]] void refuse_face() {

@@ -1,5 +1,5 @@
-// Finds the pairs of components (space_labels.h), one of each of two nodes, that meet at a common
-// face of the nodes' cubes.
+// Takes two nodes whose cubes have a common face, and finds the pairs of a component
+// (space_labels.h) of one node and a component of the other node that meet at this face.
 //
 // The pairs are computed from the pairs of the octants at the face. A cache remembers the pairs of
 // recent nodes, because equal nodes are often neighbors of equal nodes. The cache only saves time:
@@ -18,8 +18,8 @@ class FaceRelations {
  public:
   static constexpr uint32_t kMaxComponents = 8;
 
-  // Bit 8 i + j of `pairs` is set if component i of the low node meets component j of the high
-  // node.
+  // Bit 8 i + j of `pairs` is set if component i of the node `low` of find() meets component j of
+  // the node `high`.
   struct Meeting {
     uint64_t pairs = 0;
   };

@@ -24,7 +24,8 @@ struct SeedPlace {
                            // around the voxel
 };
 
-// Returns the octant that contains the voxel, of the node at depth `depth` whose cube contains it.
+// Returns the octant around the voxel in a node at depth `depth`. The node's cube must contain the
+// voxel.
 inline int octant_around(const CubeVoxel& voxel, int brick_depth, int depth) {
   const int bit = brick_depth + kBrickLevels - 1 - depth;
   return static_cast<int>((voxel[0] >> bit & 1) << 2 | (voxel[1] >> bit & 1) << 1 |

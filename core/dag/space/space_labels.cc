@@ -10,7 +10,8 @@ namespace {
 
 constexpr int kOctants = 8;
 constexpr uint32_t kNone = UINT32_MAX;
-// Maximum total number of components of a node's octants.
+// Maximum total number of components of a node's octants, so that the 16-bit numbers in
+// SpaceLabels::Depth::maps are sufficient.
 constexpr size_t kMaxComponents = 0xfff0 - kOctants;
 
 // Appends a value to an array of which `size` elements are used.
@@ -257,8 +258,9 @@ class SpaceLabeler {
   SpaceLabels& out_;
   FaceRelations relations_;
   uint64_t touch_used_ = 0, maps_used_ = 0;
-  // The components of the node's octants, followed by the components of smaller cubes that are
-  // being joined, as numbers of components of the octants.
+  // Numbers of components of the node's octants. The first elements stand for these components
+  // themselves. Further elements stand for components of the smaller cubes that are being joined,
+  // and have the number of the octant's component that contains the smaller cube's component.
   std::vector<uint32_t> elements_;
   std::vector<uint32_t> parents_;  // union-find over the components of the octants
   std::vector<uint8_t> touch_;

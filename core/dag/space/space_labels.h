@@ -26,8 +26,8 @@ class SpaceLabels {
   static constexpr uint16_t kClosed = 0xffff;
 
   // `levels` must outlive this object. Throws OutOfBudget if the memory is too small, or if a node
-  // has too many components for 16 bits. Neither happens to cubes of kSmallestEdge within
-  // kSmallestBudget.
+  // has too many components for 16 bits. Neither happens for a cube with the edge kSmallestEdge and
+  // a budget of kSmallestBudget (core/backend/backend.h).
   SpaceLabels(PooledMemory& memory, const NodeLevels& levels);
 
   const NodeLevels& levels() const { return levels_; }
@@ -83,9 +83,9 @@ class SpaceLabels {
   PooledArray<uint64_t> brick_masks_;
 };
 
-// Returns the components of a node's octants that are connected within the node with component
-// `component` of octant `octant`: 1 for each of them, in the order of the octants, otherwise 0.
-// Throws OutOfBudget.
+// Returns an element for each component of a node's octants, in the order of the octants: 1 if the
+// component is connected, within the node, with component `component` of octant `octant`, otherwise
+// 0. Throws OutOfBudget.
 std::vector<uint8_t> connected_components(PooledMemory& memory, SpaceLabels& labels, int depth,
                                           uint32_t row, int octant, uint32_t component);
 
