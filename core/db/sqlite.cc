@@ -19,9 +19,9 @@ bool has_no_inodes(const std::string& path) {
   return statvfs(parent_directory(path).c_str(), &s) == 0 && s.f_files > 0 && s.f_favail == 0;
 }
 
-// Throws Error{kInvalidInput} if `path` exists and is not a regular file (but, for example, a
-// symbolic link or a pipe), because voxdag did not create it. SQLite itself does not follow links
-// to its other files.
+// Throws Error{kInvalidInput} if anything other than a regular file exists at `path`, such as a
+// symbolic link or a pipe, because voxdag did not create it. The other files of a database, such as
+// its log, need no check, because SQLite does not follow links to them.
 void refuse_foreign(const std::string& path) {
   struct stat found {};
   if (lstat(path.c_str(), &found) == 0 && !S_ISREG(found.st_mode))
@@ -56,7 +56,8 @@ void refuse_foreign(const std::string& path) {
     if (code_of_errno(reason) == ErrorCode::kNoSpace) code = ErrorCode::kNoSpace;
     message += ": " + errno_text(reason);
   } else if (database && sqlite3_extended_errcode(database) == SQLITE_IOERR_SHMSIZE) {
-    // SQLite does not keep the reason why the index of its log cannot grow.
+    // SQLite could not enlarge the file with the index of its log (-shm). It does not keep the
+    // errno value, so the message assumes that the limit of file sizes was exceeded.
     code = ErrorCode::kNoSpace;
     message += ": " + errno_text(EFBIG);
   }
@@ -178,8 +179,8 @@ int64_t SqlDatabase::integer(const std::string& sql) {
 }
 
 SqlTransaction::SqlTransaction(SqlDatabase& database, Durable durable) : database_(database) {
-  // In WAL mode, FULL syncs the log at each commit, and NORMAL does not. The next commit with FULL
-  // also syncs the changes of commits with NORMAL.
+  // In WAL mode, FULL syncs the log at each commit, and NORMAL does not. A commit with FULL also
+  // syncs the changes of all earlier commits with NORMAL.
   database_.execute(durable == Durable::kNow ? "PRAGMA synchronous = FULL"
                                              : "PRAGMA synchronous = NORMAL");
   database_.execute("BEGIN IMMEDIATE");

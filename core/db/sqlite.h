@@ -16,7 +16,7 @@ struct sqlite3_stmt;
 
 namespace voxdag {
 
-// One prepared statement. Parameters and columns count from 0.
+// One prepared statement. Parameters and columns are numbered from 0.
 class SqlStatement {
  public:
   SqlStatement(sqlite3* database, std::string_view sql);
