@@ -215,7 +215,7 @@ std::string expectation(const Field& field);
 // the field's limits as text.
 std::string expected_integer(const Field& field, const std::string& low, const std::string& high);
 bool fits_integer_limits(const Field& field, int64_t value);
-// True if the text has no control characters and its number of characters is within the limits.
+// True if the text has no control characters and its length is within the limits of the field.
 bool is_valid_line(const Field& field, std::string_view text);
 
 template <class T>

@@ -11,7 +11,8 @@ constexpr size_t kMaxShownBytes = 64;  // bytes of a text
 constexpr size_t kMaxShownItems = 8;   // items of an array
 
 // Returns a value as text for messages: printable ASCII of limited length. Does not show the
-// contents of an object or of a nested array, because formatting nested JSON recurses.
+// contents of an object or of a nested array, because formatting deeply nested JSON recurses and
+// could overflow the stack.
 std::string shown(const FieldJson& json) {
   if (json.is_object()) return "an object";
   if (json.is_array() &&

@@ -23,8 +23,9 @@ namespace json_fields {
 // Like the other refuse(), but the message also shows the refused value, shortened.
 [[noreturn]] void refuse(const std::string& name, const std::string& expected,
                          const FieldJson& found);
-// Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed` with
-// the number and returns the result of this call. Returns false if `json` is not a whole number.
+// Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed`,
+// depending on the type of the JSON number, and returns the result of this call. Returns false if
+// `json` is not a whole number.
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
                   const std::function<bool(int64_t)>& take_signed);
 
@@ -146,8 +147,8 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
       if (!NameSetTraits<T>::add(value, name)) refuse(field.name, expectation<T>(field), name);
   } else if constexpr (IsVector<T>::value) {
     // In options, a list of limited length may be written as a single item. The item is not copied
-    // into an array first, because copying nested JSON recurses, and a request may be nested
-    // deeply.
+    // into an array first, because copying recurses, and could overflow the stack if the JSON of a
+    // request is deeply nested.
     const bool is_item = members == Members::kGiven && field.max_items > 0 && !json.is_array();
     expect(is_item || json.is_array());
     value.clear();
