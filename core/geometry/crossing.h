@@ -1,5 +1,5 @@
-// The exact crossing of a triangle with a row: a line through lattice points along an axis. One
-// predicate serves all rules that look through a voxel's center or at the sides of a surface.
+// The exact crossing of a triangle with a row: a line through lattice points along an axis. The
+// voxel rule kThin (voxel_rule.h) and the rules for solids (solid_rule.h) both use this test.
 //
 // Row points have even coordinates and vertices odd ones, so no row meets a vertex. Each point is
 // thought of as moved by (e, e^2, e^3), where e > 0 is infinitely small. Then no row meets an edge
@@ -37,7 +37,7 @@ VOXDAG_HD constexpr Int floor_divide(Int x, Int y) {
   return quotient - (quotient * y > x ? 1 : 0);
 }
 
-// Limits of a triangle's coordinates and extents, for RowTest in 64 bits.
+// Limits of a triangle's coordinates and extents, in lattice units, for RowTest in 64 bits.
 inline constexpr int64_t kRowCoordinate = int64_t{1} << 30;
 inline constexpr int64_t kRowExtent = int64_t{1} << 20;
 
@@ -62,7 +62,7 @@ class RowTest {
     if (n_[a_] > 0) sign_ = -1;
     if (n_[a_] < 0) sign_ = 1;
     const bool is_rising = n_[0] != 0 ? n_[0] > 0 : n_[1] != 0 ? n_[1] > 0 : n_[2] > 0;
-    // From here on, the normal is multiplied by the sign of n_a.
+    // From here on, n_ is the normal times the sign of its component n_a, so that n_a > 0.
     beyond_at_zero_ = is_rising == (n_[a_] > 0);
     for (PlaneInt& x : n_) x *= -sign_;
     for (int i = 0; i < 3; ++i) set_edge(i, triangle.v[i], triangle.v[(i + 1) % 3]);
@@ -71,9 +71,9 @@ class RowTest {
   // Returns the sign of the triangle's crossings: 0 if it crosses no row along the axis.
   VOXDAG_HD int sign() const { return sign_; }
 
-  // The edges' values at a row. The triangle crosses the row iff all values are >= 0. edge_steps()
-  // returns the changes of these values for a row that is `distance` units further along axis c
-  // (or, if `is_along_c` is false, along axis b).
+  // The values of the three edges' tests (Edge) at a row: the triangle crosses the row iff all
+  // values are >= 0. edge_steps() returns how much these values increase from a row to the row that
+  // is `distance` units further along axis c (along axis b if `is_along_c` is false).
   struct EdgeValues {
     EdgeInt of[3];
   };
@@ -90,8 +90,8 @@ class RowTest {
       out.of[i] = (is_along_c ? edges_[i].rise : -edges_[i].run) * static_cast<EdgeInt>(distance);
     return out;
   }
-  // Returns the slopes of the plane: along the axis, the crossing moves by -slope[k] for each unit
-  // along axis k.
+  // Sets the slopes of the triangle's plane. If a row moves by one unit along axis k, the point at
+  // which it crosses the plane moves by -slope[k] along the row.
   VOXDAG_HD void slopes(double (&slope)[3]) const {
     for (int k = 0; k < 3; ++k) slope[k] = static_cast<double>(n_[k]) / static_cast<double>(n_[a_]);
   }
@@ -108,7 +108,7 @@ class RowTest {
     return inside;
   }
 
-  // True if p is beyond the crossing on its row.
+  // True if p is beyond the crossing (see above) on the row through p.
   VOXDAG_HD bool is_beyond(const int64_t (&p)[3]) const {
     return height(p[b_], p[c_]) + n_[a_] * static_cast<PlaneInt>(p[a_] - vertex_[a_]) >= 0;
   }
@@ -122,7 +122,8 @@ class RowTest {
     return (first + (int64_t{1} << step_log2) - 1) >> step_log2;
   }
 
-  // True if the triangle crosses the leg from p to p + length * e_a; length > 0.
+  // True if the triangle crosses the leg: the part of a row from p to the point `length` units
+  // further along the axis; length > 0.
   VOXDAG_HD bool crosses_leg(const int64_t (&p)[3], int64_t length) const {
     if (!crosses(p) || is_beyond(p)) return false;
     int64_t end[3] = {p[0], p[1], p[2]};
@@ -154,7 +155,8 @@ class RowTest {
               (inside_at_zero ? 0 : 1);
   }
 
-  // Returns F, for p_a = v_a, times the sign of n_a; minus 1 if the tie rule makes 0 negative.
+  // Returns the value of F (see above) for p_a = v_a, multiplied by the sign of n_a. Subtracts 1 if
+  // F = 0 counts as negative, so that is_beyond() can compare with 0.
   VOXDAG_HD PlaneInt height(int64_t at_b, int64_t at_c) const {
     return n_[b_] * static_cast<PlaneInt>(at_b - vertex_[b_]) +
            n_[c_] * static_cast<PlaneInt>(at_c - vertex_[c_]) - (beyond_at_zero_ ? 0 : 1);
@@ -168,8 +170,8 @@ class RowTest {
   Edge edges_[3];
 };
 
-// RowTest for triangles with the extents of a few tiles, for triangles in the grid, and for all
-// triangles.
+// RowTest for triangles that satisfy has_row_extents() and has_row_coordinates(), for triangles
+// that satisfy only has_row_coordinates(), and for all triangles.
 using NarrowRowTest = RowTest<int64_t, int64_t>;
 using GridRowTest = RowTest<int64_t, int128>;
 using WideRowTest = RowTest<int128, int128>;
@@ -189,8 +191,8 @@ VOXDAG_HD inline bool has_row_extents(const FixedTriangle& t) {
   return fits;
 }
 
-// Calls visit(test) with the narrowest RowTest that is exact for crosses() and first_beyond() of
-// the triangle. Points must be inside the largest grid.
+// Calls visit(test) with the RowTest with the fewest bits whose crosses() and first_beyond() are
+// exact for the triangle. The points passed to `test` must be inside a grid of kMaxGridLevels.
 template <class Visit>
 inline void with_row_test(const FixedTriangle& t, int axis, Visit visit) {
   if (!has_row_coordinates(t))
@@ -201,8 +203,9 @@ inline void with_row_test(const FixedTriangle& t, int axis, Visit visit) {
     visit(NarrowRowTest(t, axis));
 }
 
-// Returns the sign of the triangle's crossing with the leg from p to p + length * e_axis, or 0 if
-// it does not cross the leg; length > 0. Requires |coordinates| <= kCoordinateLimit.
+// Returns the sign of the triangle's crossing with a leg, or 0 if the triangle does not cross it.
+// The leg is the part of a row from p to the point `length` > 0 units further along `axis`.
+// Requires |coordinates| <= kCoordinateLimit.
 VOXDAG_HD inline int leg_crossing(const FixedTriangle& t, const int64_t (&p)[3], int axis,
                                   int64_t length) {
   for (int k = 1; k < 3; ++k) {

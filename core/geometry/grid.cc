@@ -74,7 +74,8 @@ void WorldBounds::add(const WorldBounds& other) {
 
 WorldBounds bounds_of(std::span<const WorldTriangle> triangles) {
   if (triangles.empty()) return {};
-  // Separate bounds of all first, all second and all third vertices.
+  // `low` and `high` have separate bounds for the first, the second and the third vertices of all
+  // triangles. The loop below joins these three bounds.
   WorldTriangle low = triangles[0], high = triangles[0];
   for (const WorldTriangle& triangle : triangles)
     for (int i = 0; i < 3; ++i)

@@ -31,7 +31,8 @@ struct RealTriangle {
 };
 // A triangle in world space.
 using WorldTriangle = RealTriangle;
-// A triangle on the lattice of a grid. Its coordinates are odd integers of any magnitude.
+// A triangle on the lattice of a grid. Its coordinates are odd integers of any magnitude, stored as
+// doubles.
 using SnappedTriangle = RealTriangle;
 
 // Returns the bounds of triangles with finite vertices.

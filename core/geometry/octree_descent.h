@@ -33,7 +33,7 @@ class CubeInside {
     for (int a = 0; a < 3; ++a) low_[a] = static_cast<int64_t>(cube.position[a]) << shift_;
   }
   bool contains(const FixedTriangle& triangle) const {
-    uint64_t distances = 0;  // distances from the low corner
+    uint64_t distances = 0;  // bitwise or of all distances from the low corner
     for (const auto& vertex : triangle.v)
       for (int a = 0; a < 3; ++a) distances |= static_cast<uint64_t>(vertex[a] - low_[a]);
     return distances >> shift_ == 0;

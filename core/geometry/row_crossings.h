@@ -10,9 +10,9 @@
 
 namespace voxdag {
 
-// Finds the first sample point of a row behind the place where the row crosses a triangle.
-// Estimates this place in floating point, and uses the exact integer test only if a sample point is
-// within the estimate's error.
+// Finds the first sample point of a row beyond the place where the row crosses a triangle. Sample
+// points are at multiples of a power of two. Estimates the place in floating point, and uses the
+// exact integer test (RowTest) only if a sample point is within the estimate's error.
 class FirstBeyond {
  public:
   template <class Test>
@@ -28,14 +28,15 @@ class FirstBeyond {
     slope_c_ = slope[c_];
     v_b_ = t.v[0][b_];
     v_c_ = t.v[0][c_];
-    // The slopes are rounded twice and the sums below a few times, each by 2^-53 of its terms.
+    // The error of the estimate in find(): the slopes are rounded twice and the sums a few times,
+    // each time by at most 2^-53 of a term. Every term is at most about `largest`.
     const double largest =
         std::abs(at_v_) + std::abs(slope_b_) * extent(t, b_) + std::abs(slope_c_) * extent(t, c_);
     margin_ = 0.5 + largest * 0x1p-49;
   }
 
   // Returns the smallest k for which the point k * 2^step_log2 of the row through p is beyond the
-  // crossing. The triangle must cross the row.
+  // row's crossing with the triangle. The triangle must cross the row.
   int64_t find(const int64_t (&p)[3], int step_log2) const {
     const double at = at_v_ - slope_b_ * static_cast<double>(p[b_] - v_b_) -
                       slope_c_ * static_cast<double>(p[c_] - v_c_);
@@ -111,7 +112,8 @@ struct SampleRows {
         }
       }
     };
-    // The normal and the edges fit 64 bits; FirstBeyond rarely needs more.
+    // For these coordinates, the normal and the edge values fit in 64 bits. FirstBeyond rarely uses
+    // its exact test, which chooses its own number of bits.
     if (has_row_coordinates(triangle))
       visit_rows(NarrowRowTest(triangle, axis));
     else
@@ -122,7 +124,8 @@ struct SampleRows {
   struct Range {
     int low, high;
   };
-  // Returns the rows that the triangle's box contains, along one axis of their positions.
+  // Returns the range of the rows' indices along `axis`, which is one of the two axes across the
+  // rows, for which the rows' coordinate is within the triangle's bounding box.
   Range rows_of(const FixedTriangle& t, int axis) const {
     const int64_t from = t.low(axis) - low[axis], to = t.high(axis) - low[axis];
     if (to < 0 || from > int64_t{blocks} << pitch_log2) return {1, 0};

@@ -45,12 +45,14 @@ VOXDAG_HD constexpr int32_t view_of(SolidRule rule, int32_t left, int32_t total)
   if (rule == SolidRule::kWinding) return 2 * left - total;
   return (left & 1) + ((total - left) & 1);
 }
-// Returns the view behind crossings whose signs sum to `crossings`. `view` is the view before them.
+// Returns the view along a row from a point behind crossings of this row. `view`: the view from a
+// point before these crossings. `crossings`: the sum of their signs.
 VOXDAG_HD constexpr int32_t view_after(SolidRule rule, int32_t view, int32_t crossings) {
   if (rule == SolidRule::kWinding) return view + 2 * crossings;
   return (crossings & 1) != 0 ? 2 - view : view;
 }
-// Returns the sum of the three views behind crossings of a walk along any axes.
+// Returns the sum of the three views from the end of a walk along any axes. `views`: this sum at
+// the start of the walk. `crossings`: the sum of the signs of the walk's crossings.
 VOXDAG_HD constexpr int64_t views_after(SolidRule rule, int64_t views, int64_t crossings) {
   if (rule == SolidRule::kWinding) return views + 6 * crossings;
   return (crossings & 1) != 0 ? 6 - views : views;
@@ -66,16 +68,19 @@ struct UnitViews {
     ++corners;
   }
   VOXDAG_HD bool is_inside() const { return (sum < 0 ? -sum : sum) > 3 * corners; }
-  // True if the directions of the unit's corners do not all agree.
+  // True if the 6 * corners directions (see above) do not all agree: for example, if some count as
+  // outside and others as inside.
   VOXDAG_HD bool is_disputed() const { return sum % (6 * corners) != 0; }
 };
 
-// The two axes of a row's position, in the order x, y, z. The rows of a square of m^2 blocks are
-// stored as (m + 1)^2 numbers; the second axis varies fastest.
+// The two axes other than a row's axis, in the order x, y, z. The coordinates along them are the
+// position of the row. Values of the rows through a square of m^2 blocks are stored as an array of
+// (m + 1)^2 numbers, in which the position along the second axis varies fastest.
 VOXDAG_HD constexpr int first_row_axis(int axis) { return axis == 0 ? 1 : 0; }
 VOXDAG_HD constexpr int second_row_axis(int axis) { return axis == 2 ? 1 : 2; }
 
-// A solid's rule, and the views along each axis from the low face of a cube.
+// A solid's rule, and for each axis the views along this axis from the corners on the low face of a
+// cube.
 struct SolidEntry {
   SolidRule rule = SolidRule::kNone;
   std::vector<int32_t> views[3];  // one for each sample row of the closed cube

@@ -19,7 +19,7 @@ struct VoxelRuleTraits {
   bool is_parallel;
 };
 
-// In the order of the values of VoxelRule.
+// The rows are in the order of the values of VoxelRule.
 inline constexpr std::array<VoxelRuleTraits, 2> kVoxelRules = {{
     {"shell", true},
     {"thin", true},
