@@ -1,6 +1,6 @@
-// Reads AVIF images with libavif, which decodes an image in one piece. The conversion of its planes
-// to RGB is own code (yuv_rows.h), because the library's conversion differs between versions and
-// machines.
+// Reads AVIF images with libavif, which decodes an image in one piece. yuv_rows.h converts the
+// image's planes to RGB, because the results of libavif's own conversion differ between versions
+// and machines.
 #include <avif/avif.h>
 
 #include <algorithm>

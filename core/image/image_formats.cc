@@ -71,7 +71,8 @@ constexpr Signature kSignatures[] = {
 constexpr ImageFormat kAvif{"an AVIF image", kConvertScene, ImageDecoder::kAvif};
 constexpr ImageFormat kHeif{"an HEIF image", kConvertImage};
 
-// Returns the format of a file of the ISO base media format. Its first box lists brands.
+// Returns the format of an image in a container of the ISO base media file format, such as AVIF or
+// HEIC. The first box of the file lists brands, which identify the format.
 const ImageFormat* format_of_brands(std::string_view head) {
   constexpr size_t kBrands = 8, kBrandBytes = 4;
   const auto has = [&](std::string_view brand) {

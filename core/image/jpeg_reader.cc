@@ -42,9 +42,9 @@ class JpegReader : public ImageReader {
         throw BrokenImage{"is a JPEG image with " + std::to_string(jpeg_.num_components) +
                           " channels that are neither gray nor YCbCr nor RGB (4 channels are CMYK "
                           "or YCCK), expected one of these three"};
-      // Refuses images that not every version and build of the library decodes. Ss (in the header
-      // of the first scan) is the predictor of a lossless image. In all other images, the first
-      // scan has the mean of each block, so Ss is 0.
+      // Refuses images that not every version and build of the library decodes. In a lossless
+      // image, Ss (in the header of the first scan) is the number of a predictor, which is not 0.
+      // In all other images, Ss is 0, because the first scan begins with the mean of each block.
       if (jpeg_.arith_code)
         throw BrokenImage{"is a JPEG image with arithmetic coding, expected Huffman coding"};
       if (jpeg_.data_precision != 8)

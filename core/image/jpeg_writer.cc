@@ -55,7 +55,7 @@ struct JpegEncoder {
     jpeg.in_color_space = JCS_RGB;
     jpeg_set_defaults(&jpeg);
     jpeg_set_quality(&jpeg, kJpegQuality, TRUE);
-    // Color has the full resolution, because edges of voxels are sharp.
+    // Stores chroma in full resolution, because voxels have sharp edges.
     jpeg.comp_info[0].h_samp_factor = jpeg.comp_info[0].v_samp_factor = 1;
     jpeg.optimize_coding = TRUE;
     jpeg_start_compress(&jpeg, TRUE);

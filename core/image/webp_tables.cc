@@ -11,8 +11,8 @@ namespace {
 constexpr uint32_t kLiterals = 256, kLengthCodes = 24, kDistanceCodes = 40;
 constexpr uint32_t kMaxCacheBits = 11;
 constexpr int kMaxCodeLength = 15;
-// Bytes of libwebp's set of tables: five tables, whose sizes depend on the color cache, and a table
-// of 64 packed entries.
+// Bytes of one set of libwebp's decoding tables, without the entries for the color cache. A set has
+// five tables (kGreenBytes: the green table; kSetBytes: the others) and 64 packed entries.
 constexpr uint64_t kSetBytes = 4 * 2300 + 1024, kGreenBytes = 4 * 654;
 
 struct BrokenStream {};

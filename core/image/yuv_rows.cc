@@ -20,8 +20,9 @@ constexpr Weights kWeights[] = {
     {6, 0.299, 0.114},   {7, 0.212, 0.087}, {9, 0.2627, 0.0593}, {12, 0.299, 0.114},
 };
 
-// The position of an image row or column among chroma samples of half the image's resolution:
-// between the samples `near` and `far`, a quarter of the way from `near` to `far`.
+// The position of an image row or column among the rows or columns of chroma samples, which have
+// half the resolution. The position is between the samples `near` and `far`, a quarter of the way
+// from `near` to `far`.
 struct HalfPosition {
   size_t near, far;
 };
