@@ -19,8 +19,9 @@
 
 namespace voxdag {
 
-// Identifies a file and its contents. Equal identities mean the same file with equal bytes, unless
-// the file was changed so recently that the file system's clock has not advanced since then.
+// Identifies a file and its contents. Equal identities mean the same file with equal bytes, with
+// one exception: a change in the same tick of the file system's clock as the change before it can
+// leave the identity unchanged.
 struct FileIdentity {
   uint64_t inode = 0;
   uint64_t bytes = 0;
@@ -79,8 +80,8 @@ class FileSystem {
  public:
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
-  // Opens a file that voxdag wrote in a folder that other users may write. Like open_read(), but
-  // throws Error{kInvalidInput} if `path` is a symbolic link.
+  // Like open_read(), but throws Error{kInvalidInput} if `path` is a symbolic link. For files that
+  // voxdag wrote to a folder in which other users may also create files.
   virtual std::unique_ptr<ReadableFile> open_own(const std::string& path) = 0;
   // Creates an empty file at `path`, or empties an existing file. Throws Error{kInvalidInput} for a
   // symbolic link and for a file with other hard links; so do open_write() and try_lock().

@@ -36,9 +36,9 @@ bool begins_with(const ReadableFile& file, std::string_view bytes);
 // Renames `from` to `to` in one step, unless anything exists at `to`. Returns 0, EEXIST, or another
 // value of errno.
 int rename_without_replacing(const std::string& from, const std::string& to);
-// Does the same by creating a hard link `to` and removing `from`, for file systems without
-// renameat2(RENAME_NOREPLACE), such as NFS. Without hard links, the check and the rename are two
-// steps.
+// Like rename_without_replacing(), for file systems without renameat2(RENAME_NOREPLACE), such as
+// NFS: creates the hard link `to` and removes `from`. On a file system without hard links, checks
+// that nothing exists at `to` and then renames `from`, in two steps.
 int rename_by_link(const std::string& from, const std::string& to);
 
 }  // namespace voxdag

@@ -14,7 +14,8 @@ struct RegisteredPaths {
   std::multiset<std::string> paths;
 };
 
-// Never destroyed, because threads may use it until the process ends.
+// Returns the registered paths. They are never destroyed, because threads may use them until the
+// process ends.
 RegisteredPaths& registered() {
   static auto* const all = new RegisteredPaths;
   return *all;

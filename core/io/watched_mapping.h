@@ -21,8 +21,8 @@ class WatchedMapping {
   ~WatchedMapping();
   WatchedMapping(const WatchedMapping&) = delete;
 
-  // True if pages of the mapping were read as zeros. If so, discard all results that were computed
-  // from the mapping since this object was created.
+  // True if a page of the mapping could not be read and was replaced by zeros. Then discard all
+  // results that were computed from the mapping since this object was created.
   bool is_damaged() const;
 
  private:

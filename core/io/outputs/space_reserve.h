@@ -19,7 +19,7 @@ class SpaceReserve : public ForwardingFiles {
 
   std::unique_ptr<WritableFile> create(const std::string& path) override;
   std::unique_ptr<WritableFile> open_write(const std::string& path) override;
-  // Returns the free bytes without the reserve.
+  // Returns the free bytes of the disk minus the reserve.
   uint64_t free_space(const std::string& path) override;
 
  private:
