@@ -120,8 +120,9 @@ TEST(BakeRegion, TrianglesMayComeInParts) {
   }
 }
 
-// A cell that a triangle covers ignores triangles that only touch it. RegionBaker adds the latter
-// at the end of the region, or earlier if they are too many. The sums do not depend on the time.
+// A cell that a triangle covers ignores triangles that only touch it. RegionBaker adds triangles
+// that only touch a cell at the end of the region, or earlier if there are too many of them. The
+// sums are the same in both cases.
 TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   TestLooks looks;
   const ColorGrid grid{10, 2};

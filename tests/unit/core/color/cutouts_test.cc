@@ -281,8 +281,8 @@ TEST(Cutouts, VisibleAndHiddenImages) {
 TEST(Cutouts, BordersOfTexelsAtBordersOfVoxels) {
   const Cutouts cutouts = cutouts_of(2, 1, {Wrap::kClampToEdge, Wrap::kClampToEdge},
                                      [](uint32_t x, uint32_t) { return x == 0; });
-  // Along x, the middle of the triangle's first edge, where its visible texel ends, is the border
-  // of a voxel. The check below confirms this.
+  // The visible texel ends in the middle of the triangle's first edge. There, x is on a border
+  // between voxels, as the check below confirms.
   FixedSurface surface =
       surface_of({{0, 0, 8}, {31.9999, 0, 8}, {0, 31.9999, 8}}, {{0, 0}, {1, 0}, {0, 1}});
   ASSERT_EQ(surface.position.v[0][0] + surface.position.v[1][0], 2 * 16 * 256);

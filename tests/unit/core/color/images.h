@@ -30,8 +30,8 @@ class TestImages {
       for (uint32_t x = 0; x < width; ++x) {
         std::array<uint16_t, 4> texel;
         for (int c = 0; c < 3; ++c) {
-          // Triangle waves instead of sines: sines differ between the mathematical libraries of
-          // machines, and the digest must not.
+          // Triangle waves instead of sines: the mathematical libraries of machines compute
+          // different sines, but BakeRegion.GoldenDigest must be the same on all machines.
           const double phase = wave * (c + 1) * x / width + (wave - c) * y / height;
           const double up = phase - std::floor(phase);
           texel[static_cast<size_t>(c)] =

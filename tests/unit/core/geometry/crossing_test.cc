@@ -27,8 +27,8 @@ struct Counts {
   int crossed = 0, missed = 0, ties = 0;
 };
 
-// Compares one type of RowTest (core/geometry/row_crossings.h) with the oracle, for the row along
-// `axis` through p.
+// Compares one type of RowTest (core/geometry/crossing.h) with the oracle, for the row along `axis`
+// through p.
 template <class Test>
 void expect_right(const Triangle& t, const Point& p, int axis, Counts& counts) {
   const oracle::Crossing truth = oracle::crossing_of(t, p, axis);
@@ -154,7 +154,8 @@ TEST(Crossing, EqualsTheOracleAtTheLimits) {
   }
 }
 
-// Returns the sum of the crossings that the tested code finds on a row, up to p.
+// Returns the sum of the signs of the crossings that the tested code finds on the row through p,
+// before p. Sets `total` to the sum for the complete row.
 int winding_at(const oracle::Triangles& mesh, const Point& p, int axis, int* total) {
   const int64_t at[3] = {p[0], p[1], p[2]};
   int sum = 0;

@@ -83,7 +83,8 @@ TEST(RulesOracle, ThinVoxelsAreInTheShell) {
   }
 }
 
-// The centers of two empty voxels that share a face have the same winding number.
+// If two voxels share a face, and the rule kThin sets neither of them, their centers have the same
+// winding number.
 TEST(RulesOracle, ThinVoxelsSeparate) {
   for (const SolidKind kind : kClosedSolids) {
     SCOPED_TRACE(kind_name(kind));

@@ -59,8 +59,8 @@ class FailingDisk : public ForwardingFiles {
   const int fails_at_;
 };
 
-// The order of calls survives a power cut: the contents are durable before they get the name, and
-// the name is durable before the call returns.
+// The order of the calls is right for a power cut at any time: the contents are durable before they
+// get the name, and the name is durable before write_file_atomically() returns.
 TEST(AtomicWrite, SyncsBeforeRenaming) {
   TemporaryFolder folder;
   FailingDisk disk(0);

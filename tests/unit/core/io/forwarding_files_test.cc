@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// Replaces the first file that is opened by the file `other`, immediately after the opening.
+// When the first file is opened, immediately replaces it at its path with the file `other`.
 class ReplacedFiles : public ForwardingFiles {
  public:
   using ForwardingFiles::ForwardingFiles;

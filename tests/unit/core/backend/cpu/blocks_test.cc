@@ -103,8 +103,8 @@ TEST_F(Memos, FindWholeBlocksOnly) {
       if (memo.find(key_of(block), block)) continue;
       memo.insert(key_of(block), block, {word(), i, 1, 1});
       const BlockMemo::Node* found = memo.find(key_of(block), block);
-      // If insert() made the memo grow, the block moved to the slot of its block_key(), so key 77
-      // does not find it.
+      // If insert() made the memo grow, the block moved to the slot of its block_key(), so a lookup
+      // with the key 77 of key_of() does not find it.
       if (found == nullptr) found = memo.find(block_key(block), block);
       ASSERT_NE(found, nullptr) << i;
       ASSERT_EQ(found->id, i);

@@ -10,7 +10,7 @@
 namespace voxdag::cpu {
 namespace {
 
-// Everything that building nodes takes: the tables of a subvolume, the reducer, and the plane memo.
+// The objects that build nodes: the tables of a subvolume, the reducer, and the plane memo.
 struct Workshop {
   Workshop(const Kernels& kernels, VoxelRule its_rule)
       : tables(memory, 10),
@@ -62,8 +62,8 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   const int64_t corners[3][2] = {{-reach, -reach}, {2 * reach, -reach}, {-reach, 2 * reach}};
   const int64_t offset = random.between(-region.edge * 100, region.edge * 100) * 2;
   for (int i = 0; i < 3; ++i) {
-    // The displacements along p and q are multiples of n[up], so the height is an integer, and the
-    // vertices are exactly in the plane.
+    // The displacements along the axes p and q are multiples of n[up], so the displacement along
+    // `up` is an integer, and the vertices are exactly in the plane.
     const int64_t dp = corners[i][0] * 2 * n[up], dq = corners[i][1] * 2 * n[up];
     const int64_t middle = region.edge * 128 + 1;
     t[i][p] = region.low[p] * 256 + middle + dp;

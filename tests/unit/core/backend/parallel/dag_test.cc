@@ -61,7 +61,7 @@ TEST_F(ParallelDag, BothConstructionsAgreeAndAreInOrder) {
 }
 
 // The hashes have only 6 to 13 bits, so some octrees have different nodes with equal hashes. Then
-// the verification sweep must find the collision, and make_dag_by_hashes() must return nothing.
+// the verification sweep must find the collision, and make_dag_by_hashes() must return nullopt.
 // Every DAG that it returns must be right.
 TEST_F(ParallelDag, TheSweepRejectsCollisions) {
   int accepted = 0, rejected = 0;

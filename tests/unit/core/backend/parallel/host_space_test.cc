@@ -153,7 +153,8 @@ TEST_P(HostSpaceTest, ExpandVisitsEveryOutputOfItsSource) {
   }
 }
 
-// In each phase, the threads of a block see the writes of all its threads in the preceding phase.
+// A thread block kernel (thread_block.h) whose second phase reads what other threads of the block
+// wrote in the first phase.
 struct ReverseInBlocks {
   static constexpr uint32_t kThreads = 32;
   static constexpr int kPhases = 2;

@@ -26,8 +26,8 @@ void expect_defined(const FixedTriangle& t, const int64_t (&low)[3], int shift, 
   tally.cells += static_cast<uint64_t>(popcount64(expected));
 }
 
-// Compares touched_cells() with the definition for blocks of many sizes. The blocks are in or near
-// the triangle's bounding box.
+// Compares touched_cells() with the definition for blocks (groups of 4^3 or 2^3 cells) of many
+// sizes, in or near the triangle's bounding box.
 void expect_defined_around(const FixedTriangle& t, oracle::Random& random, Tally& tally) {
   for (int shift = 8; shift <= 27; shift += static_cast<int>(random.between(1, 3)))
     for (int i = 0; i < 4; ++i) {

@@ -71,8 +71,8 @@ struct Node {
 // used slots wrap around from the end of the table to its start.
 class NodeTables : public Tables {
  protected:
-  // Sets the array elements after the node's last child to random values, because they must not
-  // affect the result.
+  // Adds a node to the table, and returns its id. Sets the array elements after the node's last
+  // child to random values, because they must not affect the result.
   uint32_t add(NodeTable& table, const Node& node) {
     uint32_t children[8];
     for (uint32_t& child : children) child = static_cast<uint32_t>(random_.between(0, 3));

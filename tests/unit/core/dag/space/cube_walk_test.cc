@@ -12,8 +12,8 @@ namespace {
 
 using CubeFilter = NodeRef (*)(PooledMemory&, const CubeNeighbors&, int, uint32_t, SubDagTables&);
 
-// Returns, for each voxel of the octant at `low`, 1 if a voxel with this value is in the window
-// from the voxel to voxel + step * radius along each axis.
+// Returns, for each voxel v of the octant at `low`, 1 if a voxel of `grid` with the value `value`
+// is in the window that extends from v to v + step * radius along each axis.
 SpaceGrid window_grid(const SpaceGrid& grid, const SpaceCell& low, int step, int radius,
                       uint8_t value) {
   SpaceGrid found = grid;

@@ -45,7 +45,8 @@ TEST(Space, FillSetsWhatTheBorderDoesNotReach) {
     });
 }
 
-// A seed fills its component and no other one, whether it reaches the faces or not.
+// A seed fills its component and no other one, whether the component reaches the cube's faces or
+// not.
 TEST(Space, SeedFillsItsComponent) {
   std::mt19937 engine(5);
   std::array<int, 3> kinds{};
@@ -115,7 +116,7 @@ TEST(Space, FullCube) {
   EXPECT_EQ(dag.summary.dag_nodes, 5u);
 }
 
-// Tests a cube with more components than the key of a filled node can hold labels.
+// Tests a cube with more than 64 components, which is more than FilledNode::outside has bits.
 TEST(Space, ManyComponents) {
   SpaceGrid grid(32);
   grid.for_each([&](const SpaceCell& c) { grid.at(c) = (c[0] + c[1] + c[2]) % 2 == 0; });

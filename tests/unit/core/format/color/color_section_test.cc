@@ -88,7 +88,7 @@ TEST_F(ColorSectionTest, HasTheColorsOfAllLevels) {
         check({levels, color_levels, random_codes(levels * 100 + color_levels, levels, count),
                smooth_colors(color_levels, 3)});
     // The error is larger than on surfaces, because cells that are far from each other share
-    // blocks. If the colors were in a wrong order, it would be about 10000.
+    // blocks. If the colors were in a wrong order, the error would be about 10000.
     EXPECT_LT(error, levels < 4 ? 4000 : 2500);
   }
 }

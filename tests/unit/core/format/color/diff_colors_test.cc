@@ -81,8 +81,8 @@ TEST_F(DiffColors, OfOtherVoxels) {
   check({8, 8, voxels, smooth_colors(8, 3)}, {8, 8, others, smooth_colors(8, 3)});
 }
 
-// The files have different color grids. The comparison uses the coarser one, whose cells are in
-// another tier of the finer one.
+// The files have different color grids. The comparison uses the cells of the coarser grid. The file
+// with the finer grid has the colors of these cells in another tier (docs/format.md).
 TEST_F(DiffColors, OfOtherColorGrids) {
   const Codes voxels = random_codes(3, 9, 3000);
   check({9, 9, voxels, smooth_colors(9, 0)}, {9, 2, voxels, smooth_colors(2, 0)});

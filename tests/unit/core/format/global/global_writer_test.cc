@@ -164,9 +164,9 @@ TEST_F(GlobalWriterTest, EveryFailureLeavesNothingHalf) {
   }
 }
 
-// A file is synced after each number of levels. A new writer resumes the file and writes the same
-// bytes as one writer alone. Some levels end within a checksum block, and some checksum blocks end
-// within a level.
+// After any number of levels, a writer can sync its file and be replaced by a new writer that
+// resumes the file. The bytes are the same as from a single writer. Some levels end within a
+// checksum block, and some checksum blocks end within a level.
 TEST_F(GlobalWriterTest, ResumesAfterAnyLevel) {
   oracle::Random random(4);
   oracle::Voxels voxels(128);

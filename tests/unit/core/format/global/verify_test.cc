@@ -286,7 +286,7 @@ TEST_P(MutationTest, NeverCrashesAReader) {
     oracle::Random random(seed);
     ByteString changed = bytes;
     for (int64_t i = random.between(1, 4); i > 0; --i) {
-      // In the header's fields, in a level's first words, or anywhere.
+      // The changed byte is in the header's fields, in a level's first words, or anywhere.
       const size_t at = static_cast<size_t>(
           random.coin()   ? random.between(0, 300)
           : random.coin() ? random.between(1, 3) * 4096 + random.between(0, 60)

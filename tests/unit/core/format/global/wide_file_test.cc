@@ -96,8 +96,8 @@ TEST_F(WideFileTest, PointersOfOtherWidthsAreRefused) {
     EXPECT_THAT(error_with(bricks, bits).message(),
                 HasSubstr("header: level 4: pointers of " + std::to_string(bits) +
                           " bits, expected 32 or 64"));
-  // If the header gives the valid width that the file does not use, the words of the parents do not
-  // match it.
+  // 32 bits is a valid width, but the bricks' parents have pointers of 64 bits, so their words do
+  // not match the header.
   EXPECT_EQ(error_with(bricks, uint32_t{32}).code(), ErrorCode::kCorrupt);
   EXPECT_EQ(error_with(kLevelsAt + kPointerBitsAt, uint32_t{33}).code(), ErrorCode::kCorrupt);
 }
@@ -127,14 +127,14 @@ TEST(WideNodeTest, HasPointersOfTwoWords) {
 TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{0}).message(),
               HasSubstr("pointers of 64 bits, expected 32"));
-  // Version 1 reserves bytes that are not 0 in this file.
+  // In version 1, bytes are reserved that are not 0 in this file.
   EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
   make_narrow();
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{1}).message(), HasSubstr("reserved"));
   EXPECT_EQ(error_with(kVersionAt, uint32_t{2}).code(), ErrorCode::kCorrupt);
 }
 
-// A level may not have more words than its pointers can address.
+// A level may not have more words than the pointers to this level can address.
 TEST_F(WideFileTest, NarrowPointersReachTwoToThe32) {
   const size_t bricks = kLevelsAt + kBrickLevel * kLevelEntryBytes;
   EXPECT_THAT(error_with(bricks + 16, (uint64_t{1} << 40) + 1).message(),
