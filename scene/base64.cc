@@ -8,9 +8,9 @@
 namespace voxdag {
 namespace {
 
-// Decodes complete groups of four characters to `out`. Returns false for invalid characters, which
-// include spaces at both ends of `characters`. libcrypto skips such spaces, but then it decodes
-// fewer bytes, which the comparison of sizes detects.
+// Decodes groups of four characters to `out`. Returns false for invalid characters, also for spaces
+// at the beginning or the end. libcrypto skips such spaces but then decodes fewer bytes, which the
+// comparison in the last line detects.
 bool decode_groups(std::span<const std::byte> characters, std::byte* out) {
   const int bytes = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(out),
                                     reinterpret_cast<const unsigned char*>(characters.data()),

@@ -16,8 +16,8 @@ struct Part {
   uint32_t first_material;
 };
 
-// Appends the materials `more` of another scene to `all`. Material::image and Material::number of
-// these materials are increased by the numbers of images and names that `all` already has.
+// Appends the materials `more` of another scene to `all`. Increases their Material::image by the
+// number of images in `all`, and their Material::number by the number of names in `all`.
 void add_materials(SceneMaterials& all, SceneMaterials more) {
   for (Material& material : more.materials) {
     if (material.image != Material::kNoImage)

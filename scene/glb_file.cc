@@ -44,7 +44,7 @@ GlbFile::~GlbFile() {
     file_.reset();
     files_.remove(path_ + ".partial");
   } catch (const Error&) {
-    // Another error ended the writing, and the caller reports that one.
+    // An error here is ignored: the caller reports the error that ended the writing.
   }
 }
 

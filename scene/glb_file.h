@@ -43,7 +43,7 @@ class GlbFile {
   std::vector<std::byte> buffer_;
   uint64_t written_ = 0;
   bool finished_ = false;
-  std::optional<TemporaryPath> registered_;  // the partial file, until it is finished
+  std::optional<TemporaryPath> registered_;  // registers the partial file until finish()
 };
 
 // True if the file is a .glb whose JSON contains the text `generator`.

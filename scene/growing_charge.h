@@ -18,8 +18,8 @@ class GrowingCharge {
   GrowingCharge(MemoryBudget& budget, std::string what)
       : charge_(budget, 0, what), what_(std::move(what)) {}
 
-  // Increases the charge to at least `bytes` in total. Throws Error{kOutOfMemory} if `bytes` and
-  // one step more do not fit the budget.
+  // Increases the charge to at least `bytes` in total. Throws Error{kOutOfMemory} if `bytes` plus
+  // one step do not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(

@@ -169,8 +169,8 @@ void check_lengths(const std::string& path, const Mesh& mesh) {
                           " texture coordinates: expected two for each of " + vertices);
 }
 
-// Returns the path at which the PLY reader looks for a texture of the mesh at `mesh_path`, which
-// has no folder. Throws if `name` is not the name of a file.
+// Returns the path at which the PLY reader looks for the texture `name` of the mesh at `mesh_path`.
+// `mesh_path` has no folder. Throws if `name` is not the name of a file.
 std::string texture_path(const std::string& mesh_path, const std::string& name) {
   if (name.empty() || name.find_first_of("/\\:\"\n\r") != name.npos)
     refuse_mesh(mesh_path, "the texture's name \"" + name +

@@ -38,7 +38,7 @@ class MeshFiles : public ForwardingFiles {
 
  private:
   std::map<std::string, Mesh> meshes_;
-  std::map<std::string, std::span<const std::byte>> bytes_;  // of textures and scene files
+  std::map<std::string, std::span<const std::byte>> bytes_;  // contents of textures and scene files
 };
 
 }  // namespace voxdag

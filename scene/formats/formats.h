@@ -18,8 +18,8 @@ namespace voxdag {
 struct SceneFormat {
   std::string_view name;                      // "glTF"
   std::span<const std::string_view> endings;  // file name endings, such as ".glb"
-  // True if the file begins like this format. The first format of the table that returns true reads
-  // the file.
+  // True if the file begins like this format. The first format of the table whose sniff() returns
+  // true reads the file.
   bool (*sniff)(const ReadableFile& file);
   // Opens one file as open_scene() does.
   std::unique_ptr<TriangleSource> (*open)(FileSystem& files, std::unique_ptr<ReadableFile> file,

@@ -54,8 +54,8 @@ class City {
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // The draw that decides whether the block becomes a park comes after make_street(). The
-    // ground's color depends on this decision, so with colors the ground is added after it.
+    // With colors, the color of the ground depends on whether the block becomes a park. This is
+    // decided at random after make_street(), so the ground is then added after the decision.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);

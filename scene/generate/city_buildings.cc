@@ -10,7 +10,7 @@ constexpr double kWindowDepth = 0.25;
 constexpr double kSlabHeight = 0.5;
 constexpr Rgba8 kSlab{175, 172, 168, 255};
 
-// One or more storeys of a building. Its walls consist of bays with a window in each.
+// One or more floors of a building. The walls consist of bays, each with one window.
 struct Tier {
   double x = 0, z = 0;  // center
   double y = 0;
@@ -80,7 +80,7 @@ void add_crown(SceneBuilder& scene, const Tier& tier, Random& random) {
                                {half * 0.6875, half * 1.25, half * 0.6875}, turn);
 }
 
-// Adds equipment boxes at odd angles, sometimes a mast.
+// Adds equipment boxes at odd angles, and sometimes a mast.
 void add_flat_roof(SceneBuilder& scene, const Tier& tier, Random& random) {
   const double y = tier.top() + kSlabHeight;
   for (int i = random.between(1, 3); i > 0; --i) {

@@ -15,7 +15,7 @@ json vectors(uint64_t count) {
   return {{"componentType", kGlbFloat}, {"type", "VEC3"}, {"count", count}};
 }
 
-// Returns a primitive whose arrays are consecutive, starting with array `positions`.
+// Returns a primitive whose arrays are consecutive, starting with the array number `positions`.
 json primitive(uint64_t positions, bool has_colors, uint32_t material) {
   if (!has_colors) return {{"attributes", {{"POSITION", positions}}}, {"indices", positions + 1}};
   return {{"attributes", {{"POSITION", positions}, {"COLOR_0", positions + 1}}},

@@ -5,8 +5,8 @@
 namespace voxdag {
 namespace {
 
-// The corner index of a box is 4x + 2y + z, with 0 for the low side. Faces are counter-clockwise
-// from outside, the bottom last.
+// The corner index of a box is 4x + 2y + z, with 0 for the low side. The corners of a face are
+// counter-clockwise as seen from outside. The bottom is the last face.
 constexpr uint8_t kBoxFaces[6][4] = {{0, 1, 3, 2}, {5, 4, 6, 7}, {4, 0, 2, 6},
                                      {1, 5, 7, 3}, {3, 7, 6, 2}, {0, 4, 5, 1}};
 

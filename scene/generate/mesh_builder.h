@@ -1,5 +1,5 @@
-// A small indexed mesh in memory, and the shapes that generated scenes consist of. It has at most
-// 65 535 vertices, so that 16-bit indices suffice (the index 65 535 is glTF's restart value).
+// A small indexed mesh in memory, and the shapes that generated scenes consist of. A mesh has at
+// most 65 535 vertices, so that 16-bit indices suffice (the index 65 535 is glTF's restart value).
 // Coordinates are computed in doubles and rounded to float once, when a vertex is added.
 #pragma once
 
@@ -46,7 +46,7 @@ struct MeshBuilder {
   uint32_t vertices() const { return static_cast<uint32_t>(positions.size()); }
   uint32_t triangles() const { return static_cast<uint32_t>(indices.size() / 3); }
 
-  // Color of vertices added later. If it is not set, the mesh has no colors.
+  // Color of vertices added later. If no color is set, the mesh has no colors.
   std::optional<Rgba8> color;
   uint32_t material = 0;
 
@@ -61,7 +61,7 @@ struct MeshBuilder {
   void triangle(const Vec3& a, const Vec3& b, const Vec3& c);
   // Adds a quad with 4 new vertices, counter-clockwise seen from outside.
   void quad(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
-  // Adds a box: 8 new vertices, 12 triangles, or 10 without its bottom.
+  // Adds a box: 8 new vertices and 12 triangles (10 without the bottom).
   void box(const Vec3& low, const Vec3& high, bool bottom = true);
   // Adds a box without bottom that stands on `base`, turned about its vertical axis: 8 new
   // vertices, 10 triangles. In `half_and_height`, x and z are half of the edges, and y is the

@@ -25,8 +25,8 @@ AssimpScene::AssimpScene(const std::string& path) : path_(path) {
   scene_ = importer_.ReadFile(path, 0);
   if (!scene_) refuse_file();
   add_losses();
-  // Removes the parts in kRemoved. Computes texture coordinates for projections such as spheres,
-  // and applies the transforms of texture coordinates. Does not change positions.
+  // Removes the parts in kRemoved. Computes texture coordinates for materials that define a
+  // projection, such as a sphere. Applies transforms of texture coordinates. Keeps positions.
   scene_ = importer_.ApplyPostProcessing(aiProcess_RemoveComponent | aiProcess_GenUVCoords |
                                          aiProcess_TransformUVCoords);
   if (!scene_) refuse_file();

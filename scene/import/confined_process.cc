@@ -25,7 +25,8 @@ namespace {
 using nlohmann::json;
 
 constexpr int kTickMs = 100;
-// Exit statuses of the child. A child that fails otherwise sends its error before it exits.
+// Exit statuses of the child process. Before it exits with kFailed, the child sends the error to
+// the parent, unless the parent has ended.
 constexpr int kDone = 0, kFailed = 1, kNoMemory = 2;
 
 // Returns the size of this process's address space in bytes; 0 if it is unknown.
@@ -43,8 +44,9 @@ void write_all(int file, std::string_view bytes) {
   }
 }
 
-// Confines the child. Ctrl-C only reaches the parent, which then kills the child. Libraries may
-// print, so the standard streams are closed.
+// Prepares the child process: limits its memory, and makes it ignore Ctrl-C, because the parent
+// handles Ctrl-C and then kills the child. Redirects the standard streams to /dev/null, because
+// libraries may print.
 void confine(uint64_t memory_bytes, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kFailed);  // the parent ended before the line above

@@ -1,5 +1,5 @@
 // Runs a function in a child process whose address space is limited. A crash of the child, or a
-// lack of memory there, is an Error of this process. The child dies with this thread.
+// lack of memory there, becomes an Error in this process. The child is killed if this thread ends.
 //
 // The child is forked and does not start another program. So no other thread of this process may
 // hold a lock that the function needs.

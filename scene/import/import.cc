@@ -81,7 +81,7 @@ ImportReport import_scene(FileSystem& files, const std::string& input, const std
                           Progress& progress, const CancelToken& cancel) {
   const uint64_t input_bytes = files.open_read(input)->size();
   const std::string partial = output + ".partial";
-  files.create(partial)->close();  // the child's file system knows that this file is its own
+  files.create(partial)->close();  // so that the child may replace this file
   try {
     Receiver receiver(input_bytes, warn, progress);
     run_confined(

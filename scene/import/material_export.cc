@@ -28,7 +28,7 @@ uint64_t padded(uint64_t bytes) { return (bytes + 3) / 4 * 4; }
 struct MediaType {
   ImageDecoder decoder;
   const char* name;
-  const char* extension;  // the extension of glTF that it needs, or ""
+  const char* extension;  // the glTF extension that the format needs, or ""
 };
 constexpr MediaType kMediaTypes[] = {
     {ImageDecoder::kPng, "image/png", ""},

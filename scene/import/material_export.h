@@ -37,7 +37,7 @@ class MaterialExport {
   struct Image {
     std::string name;
     const char* type = "";               // its media type
-    std::string extension;               // the extension of glTF that it needs, or ""
+    std::string extension;               // the glTF extension that the format needs, or ""
     std::string bytes;                   // bytes of an image that is embedded in the scene file
     std::unique_ptr<ReadableFile> file;  // file of an image that is not embedded
     uint64_t size() const { return file ? file->size() : bytes.size(); }

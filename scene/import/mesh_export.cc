@@ -15,7 +15,7 @@ using nlohmann::json;
 
 std::span<const aiFace> faces_of(const aiMesh& mesh) { return {mesh.mFaces, mesh.mNumFaces}; }
 
-// Returns the limits of all finite positions.
+// Returns the minimum and the maximum of each coordinate, over all finite values.
 std::array<std::array<float, 3>, 2> limits_of(const aiMesh& mesh) {
   std::array<std::array<float, 3>, 2> limits{};
   for (unsigned axis = 0; axis < 3; ++axis) {
@@ -88,7 +88,7 @@ void MeshExport::write(GlbFile& file, MemoryBudget& budget, WarningList& warning
     const float xyz[] = {p.x, p.y, p.z};
     file.put(xyz, sizeof xyz);
   }
-  // The v of assimp runs upward.
+  // In assimp, the texture coordinate v runs upward; in glTF, downward.
   if (texcoords_)
     for (const aiVector3D& p : std::span(texcoords_, mesh_.mNumVertices)) {
       const float uv[] = {p.x, 1 - p.y};

@@ -27,7 +27,7 @@ class MeshExport {
   // Adds the arrays in the order in which write() writes them. Returns the primitive without its
   // material.
   nlohmann::json add_to(GlbArrays& arrays) const;
-  // Triangulates polygons as for PLY files (scene/polygon).
+  // Writes the arrays. Triangulates polygons as the PLY reader does (scene/polygon).
   void write(GlbFile& file, MemoryBudget& budget, WarningList& warnings) const;
 
  private:

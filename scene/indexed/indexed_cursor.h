@@ -17,7 +17,7 @@ namespace voxdag {
 
 class IndexedCursor : public TriangleCursor {
  public:
-  // `cursors` is the number of cursors that share the memory. `budget` and `cancel` must outlive
+  // `cursors` is the number of cursors that share the budget. `budget` and `cancel` must outlive
   // the cursor.
   IndexedCursor(std::unique_ptr<IndexedMesh> mesh, bool skip_invalid, unsigned cursors,
                 MemoryBudget& budget, const CancelToken& cancel);

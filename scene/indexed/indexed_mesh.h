@@ -24,11 +24,11 @@ class IndexedMesh {
   // negative or needs more than 32 bits is UINT32_MAX.
   virtual void read_corners(uint64_t first, uint64_t count, uint32_t* corners) = 0;
 
-  // Prepares read_surfaces(). `cursors` is the number of cursors that share the memory. Returns
-  // false if all triangles are white, with material 0.
+  // Prepares read_surfaces(). `cursors` is the number of cursors that share the memory budget.
+  // Returns false if all triangles are white, with material 0.
   virtual bool open_surfaces(unsigned /*cursors*/) { return false; }
-  // Sets the material and corners of out[i] for triangle first + numbers[i], where the last call of
-  // read_corners() received `first` and wrote `corners`. The vertices of these triangles exist.
+  // Sets the material and corners of out[i] for the triangle first + numbers[i]. `first` and
+  // `corners` are as in the last call of read_corners(). The vertices of these triangles exist.
   virtual void read_surfaces(std::span<const uint32_t> /*numbers*/, const uint32_t* /*corners*/,
                              SurfaceTriangle* /*out*/) {}
 

@@ -15,7 +15,7 @@ namespace voxdag::obj {
 class ObjMesh : public IndexedMesh {
  public:
   // The file must have triangles. The references must outlive the mesh. `cursors` is the number of
-  // cursors that share the memory.
+  // cursors that share the budget.
   ObjMesh(const ObjFile& obj, const ObjMaterials& materials, unsigned cursors, MemoryBudget& budget)
       : obj_(obj),
         materials_(materials),

@@ -28,7 +28,7 @@ class FirstBytes : public ReadableFile {
   const ReadableFile& file_;
 };
 
-// True if the statement has the arguments of its kind, which other text files hardly have.
+// True if the statement has the arguments of its kind. Lines of other text files rarely have them.
 bool has_arguments(const Statement& statement) {
   std::string_view arguments = statement.arguments;
   double numbers[3];

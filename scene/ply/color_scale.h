@@ -1,9 +1,10 @@
 // Converts the colors of a PLY file to linear light. Red, green and blue are sRGB; alpha is linear.
 //
-// PLY does not define which number is full intensity. For 8-bit types it is 255. For other types,
-// it follows from the largest number in the element: it is 1 if this number is at most 2 (only for
-// float and double), 255 if it is at most 510, and otherwise 65535. Red, green and blue share the
-// largest number if they have the same type. Numbers below 0 or above full intensity are clamped.
+// PLY does not define which number is full intensity. For 8-bit types, full intensity is 255. For
+// other types, it follows from the largest color number of the element (the vertices or the faces):
+// full intensity is 1 if this number is at most 2 (only for float and double), 255 if it is at most
+// 510, and otherwise 65535. Red, green and blue share the largest number if they have the same
+// type. Numbers below 0 or above full intensity are clamped.
 #pragma once
 
 #include <array>
@@ -25,8 +26,8 @@ class ColorScale {
 
   // True if add() must be called with all colors of the element before set_full_intensities().
   bool needs_numbers() const;
-  // Updates the largest number of each channel with a color, one number per channel. Ignores
-  // non-finite numbers.
+  // Updates the largest number of each channel. `numbers` is a color, with one number per channel.
+  // Ignores non-finite numbers.
   void add(const double* numbers);
   void set_full_intensities();
 

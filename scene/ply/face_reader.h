@@ -17,14 +17,14 @@ namespace voxdag::ply {
 
 class FaceReader {
  public:
-  // The values that a read() returns for its triangles. They come from the triangles' faces.
+  // The values that read() returns for the triangles. They are values of the triangles' faces.
   struct Surfaces {
     std::vector<double> numbers;                   // the requested numbers, for each triangle
     std::vector<std::array<double, 6>> texcoords;  // three pairs; NaN if the face does not have
                                                    // two numbers per corner
   };
 
-  // `cursors` is the number of cursors that share the memory. The file must outlive the reader.
+  // `cursors` is the number of cursors that share the budget. The file must outlive the reader.
   FaceReader(const PlyFile& ply, unsigned cursors, MemoryBudget& budget);
 
   // Makes later calls of read() also return these properties of faces.
@@ -59,7 +59,7 @@ class FaceReader {
   std::unique_ptr<Rows> rows_;
   bool has_surfaces_ = false;
   std::unique_ptr<Splitter> splitter_;  // null if all faces are fans
-  // The face that rows_ read last, its first triangle, its triangles if it is not a fan, and the
+  // The face that rows_ read last, its first triangle, its triangles if they are not a fan, and the
   // offset of the next face. Valid only if is_loaded_ is true.
   bool is_loaded_ = false;
   uint64_t face_ = 0, first_triangle_ = 0, next_offset_ = 0;

@@ -18,7 +18,7 @@ size_t find_element(const Header& header, const char* name) {
 }
 
 // Returns the first of the properties `names` that exists and has the right form: a list if
-// `is_list` is true, otherwise a number. Returns kNone if no property does.
+// `is_list` is true, otherwise a number. Returns kNone if no property matches.
 size_t find_property(const Element& element, std::initializer_list<const char*> names,
                      bool is_list) {
   for (const char* name : names) {

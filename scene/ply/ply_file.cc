@@ -52,8 +52,8 @@ StripReader PlyFile::open_strips(MemoryBudget& budget) const {
 }
 
 // Reads all elements up to the last one that the layout uses. If a row is not exactly one line,
-// also reads the other elements, to check that no text follows the last one. Only then is the file
-// valid.
+// also reads the other elements, because the file is then valid only if no text follows the last
+// one.
 void PlyFile::pass_over_elements(MemoryBudget& budget, const CancelToken& cancel) {
   uint64_t begin = header_.data_begin;
   for (size_t i = 0; i < header_.elements.size(); ++i) {
@@ -151,8 +151,8 @@ void PlyFile::check_end(uint64_t offset, MemoryBudget& budget) const {
     refuse("has " + printable(word) + " after its last row, expected the end of the file");
 }
 
-// Finds the blocks whose faces are all fans, and clears their has_splits. Warns about faces whose
-// edges cross each other.
+// Finds the blocks whose faces are all fans (polygon/triangulator.h), and clears their has_splits.
+// Warns about faces whose edges cross each other.
 void PlyFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   if (std::ranges::none_of(face_blocks_, [](const FaceBlock& block) { return block.has_splits; }))
     return;

@@ -18,7 +18,7 @@ namespace voxdag::ply {
 class PlyMesh : public IndexedMesh {
  public:
   // The file must have triangles. The references must outlive the mesh. `cursors` is the number of
-  // cursors that share the memory.
+  // cursors that share the budget.
   PlyMesh(const PlyFile& ply, Surfaces& surfaces, unsigned cursors, MemoryBudget& budget);
 
   const std::string& path() const override { return ply_.file().path(); }

@@ -49,8 +49,8 @@ class Surfaces {
     const bool is_position = number >= 0 && number < 65536 && std::floor(number) == number;
     return is_position ? static_cast<size_t>(number) : SIZE_MAX;
   }
-  // Returns the properties of faces that surfaces need. The numbers are the channels of the color
-  // and then, if the layout has it, the number of the texture.
+  // Returns the properties of faces that surfaces need. RequestedProperties::numbers has the
+  // channels of the color and then, if the layout has it, the number of the texture.
   static RequestedProperties face_properties(const Layout& layout);
 
  private:

@@ -17,12 +17,12 @@
 namespace voxdag::points {
 namespace {
 
-// Maximum number of records that are decoded in one loop.
+// Maximum number of records that are read from the FileWindow in one step.
 constexpr uint64_t kLasWindowRecords = 1024;
 // Records per block. LasFile stores the number of points that are not withheld before each block.
 constexpr uint64_t kLasBlockRecords = 1024;
 
-// Calls visit(record, bytes) for records [first, first + count).
+// Calls visit(number, bytes) for each of the records [first, first + count).
 template <class Visit>
 void for_each_record(FileWindow& window, const LasHeader& las, uint64_t first, uint64_t count,
                      const Visit& visit) {
@@ -137,7 +137,7 @@ class LasReader : public PointReader {
       return for_each_record(window_, las_, first, count,
                              [&](uint64_t, const std::byte* record) { visit(record); });
     const auto [first_record, first_point] = file_.block_of(first);
-    uint64_t begin = first_record, point = first_point;  // a lambda cannot capture the binding
+    uint64_t begin = first_record, point = first_point;  // structured bindings cannot be captured
     const uint64_t end = first + count;
     for (; point < end && begin < las_.records; begin += kLasBlockRecords) {
       const uint64_t records = std::min(kLasBlockRecords, las_.records - begin);

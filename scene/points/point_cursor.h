@@ -25,7 +25,7 @@ uint64_t triangles_of_point(const PointOptions& options);
 
 class PointCursor : public TriangleCursor {
  public:
-  // `cursors` is the number of cursors that share the memory. All references must outlive the
+  // `cursors` is the number of cursors that share the budget. All references must outlive the
   // cursor.
   PointCursor(const PointFile& points, const PointOptions& options, unsigned cursors,
               MemoryBudget& budget, const CancelToken& cancel);

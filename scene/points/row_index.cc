@@ -33,8 +33,8 @@ void RowIndex::set_columns(std::string_view first_row, const std::string& names)
 }
 
 // Sets full_color_, the value of full intensity, from the first rows. If the file has six columns
-// without names, the last three are only assumed to be colors. If the first rows have a number
-// there that cannot be a color, the file has no colors.
+// without names, the last three are only assumed to be colors. If the first rows have a number in
+// these columns that cannot be a color, the file has no colors.
 void RowIndex::check_colors(RowReader& rows) {
   double low = 0, high = 0;
   bool has_fraction = false;

@@ -16,7 +16,7 @@ namespace voxdag::polygon {
 
 class FaceSplitter {
  public:
-  // `cursors` is the number of cursors that share the memory. `path` is the file, for messages. The
+  // `cursors` is the number of cursors that share the budget. `path` is the file, for messages. The
   // vertices and the budget must outlive this object.
   FaceSplitter(PositionSource& vertices, const std::string& path, unsigned cursors,
                MemoryBudget& budget)
@@ -28,8 +28,8 @@ class FaceSplitter {
   }
 
   // Triangulates a face of at least three corners. Returns the triangles as three positions in
-  // `corners` each, valid until the next call. Returns nothing if the triangles are the fan of the
-  // face. A face with a vertex that does not exist becomes its fan.
+  // `corners` each, valid until the next call. Returns nothing if the triangles are the fan around
+  // the first corner. A face with a vertex that does not exist becomes this fan.
   std::span<const uint32_t> split(std::span<const uint32_t> corners) {
     is_doubtful_ = false;
     if (corners.size() == 3 || !load(corners)) return {};

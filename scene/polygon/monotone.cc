@@ -10,8 +10,8 @@ bool MonotoneTriangulation::add(std::span<const uint32_t> ring, std::vector<uint
   open_[0].is_lower = open_[1].is_lower;
   for (size_t i = 2; i + 1 < order_.size(); ++i)
     if (!add_corner(order_[i], triangles)) return false;
-  // The last corner ends both chains. It counts as a corner of the other chain, so that it forms
-  // triangles with all open corners.
+  // The last corner ends both chains. Here it counts as a corner of the chain without open corners,
+  // so that it forms triangles with all open corners.
   return add_corner({order_.back().corner, !open_.back().is_lower}, triangles);
 }
 

@@ -12,7 +12,7 @@ namespace voxdag::polygon {
 
 class MonotoneTriangulation {
  public:
-  // `corners` are the corners of the sweep. They must outlive this object.
+  // `corners` are the corners that `sweep` has divided. Both must outlive this object.
   MonotoneTriangulation(const Sweep& sweep, std::span<const Point> corners)
       : sweep_(sweep), corners_(corners) {}
 

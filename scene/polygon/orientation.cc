@@ -42,7 +42,7 @@ class ExactSum {
 int orientation(const Point& a, const Point& b, const Point& c) {
   const double left = (a.x - c.x) * (b.y - c.y), right = (a.y - c.y) * (b.x - c.x);
   const double determinant = left - right;
-  // Bound on the rounding errors: (3 + 16 u) u, with u = 2^-53.
+  // Bound on the rounding error: (3 + 16 u) u times the sum of the magnitudes, with u = 2^-53.
   const double bound = 3.3306690738754716e-16 * (std::fabs(left) + std::fabs(right));
   if (determinant > bound || -determinant > bound) return sign_of(determinant);
   ExactSum sum;

@@ -86,7 +86,7 @@ Projection choose_projection(std::span<const double> xyz) {
     const Vector p = q;
     q = difference(&xyz[3 * k], &xyz[0]);
     const Vector twice_area = cross(p, q);
-    // Each difference has at most twice the error of a coordinate.
+    // The coordinates of p and q are differences, so their errors are at most 2 * rounding.
     const double tolerance = 2 * rounding * (length_1(p) + length_1(q));
     for (size_t a = 0; a < 3; ++a) planes[a].add(twice_area[a], tolerance);
   }

@@ -15,14 +15,15 @@ namespace voxdag::polygon {
 struct Projection {
   int axis = 0;              // the axis that the projection drops
   bool is_mirrored = false;  // the other two axes are exchanged
-  // True if no triangle of the fan is clockwise in the plane, except by the rounding of the
-  // coordinates. Then the fan is inside the polygon.
+  // True if no triangle of the fan is clockwise in the plane. Triangles that may be clockwise only
+  // because coordinates are rounded are ignored. Then the fan is inside the polygon.
   bool is_fan = false;
 };
 
 // A fast test that is enough for most polygons. If it returns true, the triangles of the polygon
-// are its fan, because choose_projection() would set is_fan, or because a coordinate is not finite.
-// `xyz` holds three coordinates per corner and need not be normalized.
+// are its fan: choose_projection() would set is_fan, or a coordinate is not finite. If it returns
+// false, choose_projection() must decide. `xyz` holds three coordinates per corner and need not be
+// normalized.
 bool is_clear_fan(std::span<const double> xyz);
 
 // Multiplies the coordinates by a power of two, so that the largest magnitude is from 1/2 to 1.

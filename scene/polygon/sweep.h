@@ -33,11 +33,13 @@ class Sweep {
   uint32_t rank(uint32_t corner) const { return rank_[corner]; }
 
  private:
-  // A lower edge of the polygon that crosses the sweep line. The area above it is inside.
+  // A lower edge of the polygon that crosses the sweep line. The area above the edge is inside. The
+  // helper is the last node that was directly above the edge, with no other edge between the two.
+  // At first, it is the edge's left end.
   struct LowerEdge {
-    uint32_t from;         // its left corner; its right corner is the next corner of the polygon
-    uint32_t helper_node;  // the last node of the area above it that can see the sweep line
-    bool is_merge;         // true if both edges of helper_node are to the left of it
+    uint32_t from;         // the left corner; the right one is the next corner of the polygon
+    uint32_t helper_node;  // the helper, a node at the border of the area above the edge
+    bool is_merge;         // true if both edges of the helper are to the left of the helper
   };
 
   uint32_t previous(uint32_t corner) const { return corner == 0 ? count() - 1 : corner - 1; }

@@ -1,5 +1,5 @@
 // Divides the polygons of scene files into triangles. A polygon of n corners always gives n - 2
-// triangles. They depend only on the coordinates of the corners, in their order.
+// triangles. The triangles depend only on the coordinates of the corners, in their order.
 //
 // 1. The polygon is projected to a coordinate plane (projection.h).
 // 2. If the fan (c0, c(k), c(k+1)) around the first corner has no clockwise triangle in the plane,
@@ -11,7 +11,8 @@
 // 4. Exact tests prove that no triangle is clockwise. So the triangles cover exactly the points
 //    that the polygon goes around, whatever its shape.
 // 5. If a triangle is clockwise, or if there is no such division because edges cross each other,
-//    the polygon is doubtful. It becomes its fan, which covers at least these points.
+//    the polygon is doubtful. A doubtful polygon becomes its fan, which covers at least the points
+//    of step 4.
 //
 // A polygon with a coordinate that is not finite becomes its fan. Takes O(n log n) comparisons, and
 // up to kBytesPerCorner of memory per corner. Not thread-safe.

@@ -59,7 +59,8 @@ class AsciiFacets : public Facets {
 
  private:
   // Reads the polygon that contains the triangle. Continues from the current polygon, unless the
-  // triangle is in an earlier polygon or a later block.
+  // triangle is in an earlier polygon or in a later block of recorded polygons (block_index.h). In
+  // these cases, starts at the triangle's block.
   void seek(uint64_t triangle) {
     const bool is_ahead = is_loaded_ && triangle >= first_triangle_;
     if (is_ahead && triangle < polygon_end()) return;

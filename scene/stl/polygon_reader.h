@@ -67,7 +67,7 @@ class PolygonReader {
   LineReader lines_;
   std::string_view rest_;  // the part of the current line that is not read
   bool in_facet_ = false;
-  bool is_name_next_ = false;  // the last line ended with "solid": the next may be its name
+  bool is_name_next_ = false;  // the last line ended with "solid": the next may be the name
   bool is_cut_off_ = false;
   std::vector<std::array<double, 3>> vertices_;
   polygon::Triangulator triangulator_;

@@ -21,7 +21,8 @@ class StlFile {
   // long, and Error{kOutOfMemory} if the budget is too small.
   StlFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
-  // A polygon of an ASCII file: the word "vertex" of its first vertex, and its first triangle.
+  // A polygon of an ASCII file: the position of the word "vertex" of its first vertex, and the
+  // number of its first triangle.
   struct PolygonPlace {
     uint64_t offset, line;
     uint64_t first_triangle;

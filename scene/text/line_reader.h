@@ -62,8 +62,8 @@ class LineReader {
   PageBuffer<char> buffer_;
   uint64_t base_ = 0;       // offset of buffer_ in the file
   size_t size_ = 0;         // number of bytes in buffer_
-  size_t line_ = 0;         // begin of the current line in buffer_
-  size_t next_ = 0;         // begin of the next line
+  size_t line_ = 0;         // position of the current line in buffer_
+  size_t next_ = 0;         // position of the next line in buffer_
   size_t feed_ = kUnknown;  // the first LF at or after next_, or size_ if there is none
   uint64_t number_ = 0, next_number_ = 1;
   std::string_view text_;

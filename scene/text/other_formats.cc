@@ -107,7 +107,7 @@ constexpr WideEncoding kWide[] = {{"UTF-32LE", {"\xff\xfe\0\0", 4}, 4, 0},
                                   {"UTF-16LE", "\xff\xfe", 2, 0},
                                   {"UTF-16BE", "\xfe\xff", 2, 1}};
 
-// True if the text begins with at least four characters, and its first characters are ASCII in this
+// True if the first characters of the text (at least 4, at most 16) are ASCII characters in this
 // encoding.
 bool is_ascii_in(const WideEncoding& encoding, std::string_view begin) {
   constexpr size_t kMinUnits = 4, kMaxUnits = 16;

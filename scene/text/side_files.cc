@@ -24,7 +24,8 @@ std::string_view unquoted(std::string_view name) {
   return name;
 }
 
-// Returns the paths at which the file may be, relative to the folder, in order of preference.
+// Returns the paths at which the file may be, relative to the folder of the scene file, in order of
+// preference.
 std::vector<std::string> candidates_of(std::string_view given) {
   const std::string name(unquoted(given));
   std::string with_slashes = name;

@@ -57,8 +57,8 @@ bool WordScanner::end_row() {
   return true;
 }
 
-// Returns 0 at the end of the file. A byte with the value 0 is neither a blank nor a digit, so it
-// is refused as a word.
+// Returns the next character without moving past it; 0 at the end of the file. A byte with the
+// value 0 is neither a blank nor a digit, so it is refused as a word.
 char WordScanner::peek() {
   const auto bytes = window_.at(offset_, 1);
   const char c = bytes.empty() ? '\0' : static_cast<char>(bytes[0]);

@@ -22,7 +22,7 @@ std::vector<TextureLevel> pyramid_levels(uint32_t width, uint32_t height, uint64
 
 class PyramidBuilder {
  public:
-  // A function that writes complete pages, starting at page `first`.
+  // A function that writes complete pages (texture_reader.h), starting at page `first`.
   using WritePages = std::function<void(uint64_t first, std::span<const uint64_t> texels)>;
 
   PyramidBuilder(std::span<const TextureLevel> levels, MemoryBudget& budget, WritePages write);

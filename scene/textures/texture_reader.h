@@ -40,7 +40,7 @@ struct TextureLevel {
 // The levels of all images. The levels of image i begin at first_level[i].
 struct TextureLayout {
   std::vector<TextureLevel> levels;
-  std::vector<uint32_t> first_level;  // number of images plus one
+  std::vector<uint32_t> first_level;  // one entry per image, and the end
 };
 
 class TextureReader {
@@ -54,9 +54,9 @@ class TextureReader {
   TextureReader(const TextureLayout& layout, const ReadableFile& file, const uint32_t* checksums,
                 uint64_t memory_bytes, MemoryBudget& budget);
 
-  // Returns the number of levels of an image. It is 0 for an image that no material uses or that is
-  // unreadable. The first level has the size of the image. Each further level has half the width
-  // and height, rounded down but at least 1. The last level has one texel.
+  // Returns the number of levels of an image. The number is 0 for an image that no material uses or
+  // that is unreadable. The first level has the size of the image. Each further level has half the
+  // width and height, rounded down but at least 1. The last level has one texel.
   uint32_t levels(uint32_t image) const {
     return layout_.first_level[image + 1] - layout_.first_level[image];
   }
@@ -91,8 +91,8 @@ class TextureReader {
           height_(level.height) {}
 
     uint64_t place_of(uint32_t x, uint32_t y) const {
-      // The texel's offset along y and its offset along x: each has the offset of the tile and of
-      // the texel within the tile.
+      // The texel's offset along y and its offset along x. Each is the offset of the tile plus the
+      // offset of the texel in the tile.
       const uint64_t row = (y >> kTileShift) * row_of_tiles_ + ((y % kTileEdge) << kTileShift);
       const uint64_t column = (uint64_t{x >> kTileShift} << 2 * kTileShift) + x % kTileEdge;
       return row + column;

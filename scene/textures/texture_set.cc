@@ -96,8 +96,8 @@ struct UnreadableImages {
   }
 };
 
-// Runs `body` under a shared lock, so that other threads can run theirs concurrently. If `body`
-// runs out of memory, runs it again under an exclusive lock, while no other thread runs one.
+// Runs `body` under a shared lock, so that several threads can run bodies concurrently. If `body`
+// runs out of memory, runs it again under an exclusive lock, while no other thread runs a body.
 template <class Body>
 void alone_if_necessary(std::shared_mutex& mutex, const std::string& name, const Body& body) {
   try {
@@ -356,8 +356,8 @@ class TextureSet::Builder {
   const Cutouts* const cutouts_;
   std::unique_ptr<TextureSet> set_;
   std::unique_ptr<WritableFile> writer_;  // writes the scratch file; null if none is needed
-  // Held shared by every thread that decodes. Held exclusively by a thread whose image did not fit
-  // in memory while others decoded.
+  // Every thread that decodes holds this mutex shared. A thread whose image did not fit in memory
+  // while others decoded holds it exclusively.
   std::shared_mutex mutex_;
   // For each image: the material that uses it, for messages ("": none), and why it is unreadable.
   std::vector<std::string> users_, problems_;

@@ -35,16 +35,17 @@ namespace voxdag {
 
 class TextureSet {
  public:
-  // Maximum number of texels of one image: 16384 x 16384. ImageReader checks it, as kMaxPixels.
+  // Maximum number of texels of one image: 16384 x 16384. ImageReader checks this limit
+  // (kMaxPixels).
   static constexpr uint64_t kMaxTexels = uint64_t{1} << 28;
 
   // Decodes the images that materials refer to, on up to `threads` threads, and warns about
   // unreadable ones. Advances `progress` by one for each image, in a stage that the caller began.
-  // The scratch file is created at `path`, in an existing folder, only if it is needed. Its name is
-  // removed as soon as it is open. Throws Error{kOutOfMemory} with image and material, {kNoSpace},
-  // {kIo}, {kCanceled}, and {kInvalidInput} for an image file that changed since the scene was
-  // opened. `files` and `budget` must outlive the set. With `cutouts`, no image may be used by
-  // materials with different masks (with_separate_images()).
+  // The scratch file is created at `path`, in an existing folder, only if it is needed. The file's
+  // name is removed as soon as the file is open. Throws Error{kOutOfMemory} with image and
+  // material, {kNoSpace}, {kIo}, {kCanceled}, and {kInvalidInput} for an image file that changed
+  // since the scene was opened. `files` and `budget` must outlive the set. With `cutouts`, no image
+  // may be used by materials with different masks (with_separate_images()).
   static std::unique_ptr<TextureSet> prepare(FileSystem& files, const SceneMaterials& materials,
                                              const std::string& path, unsigned threads,
                                              MemoryBudget& budget, Progress& progress,

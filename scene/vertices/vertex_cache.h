@@ -25,12 +25,12 @@ class VertexCache {
   // memory budget.
   static constexpr uint64_t kShareOfFree = 4;
 
-  // Makes one of `caches` caches that divide 1/kShareOfFree of the free bytes equally. It has space
-  // for `vertices` vertices, or for fewer if its part is smaller.
+  // Makes one of `caches` caches that divide 1/kShareOfFree of the free bytes equally. The cache
+  // has space for `vertices` vertices, or for fewer if its part of the bytes is smaller.
   VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches);
 
-  // Clears the cache and changes to `source`, which must outlive its use. place() must be called
-  // next.
+  // Clears the cache and changes to `source`, which must exist as long as at() is called. place()
+  // must be called next.
   void bind(PositionSource& source);
   // From this call on, at() returns the source's vertices transformed by `world` and, if `grid` is
   // not null, snapped to it. If a vertex is not finite after the transform, all its coordinates are

@@ -16,7 +16,7 @@ class BuildCommand : public CommandLine {
   }
 };
 
-// The report has these documented members, and their values agree with the file.
+// The report has the documented members, and their values agree with the file.
 TEST_F(BuildCommand, ReportHasTheDocumentedNames) {
   const Json report = build();
   for (const char* name :
@@ -52,8 +52,8 @@ TEST_F(BuildCommand, LeavesFileAndReportOnly) {
   EXPECT_TRUE(exists("work"));
 }
 
-// Several resolutions are built into files with the resolution in their names. Each file equals
-// the file of its own build.
+// Several resolutions are built into files with the resolution in their names. Each file equals the
+// file of a separate build with its resolution.
 TEST_F(BuildCommand, BuildsSeveralResolutions) {
   const Json reports =
       run_json({"build", "m.glb", "-r", "32,64,128", "-o", "s.vdag", "--report", "s.json"});
@@ -151,8 +151,8 @@ TEST_F(BuildCommand, KeepsResultsOfOtherScenes) {
   // The same scene from another folder.
   const std::string path = folder_.path() + "/m.glb", output = folder_.path() + "/m.vdag";
   EXPECT_EQ(run({"build", path, "-r", "64", "-o", output}).status, 0);
-  // Without a report next to the result, its scene is unknown. So the build does not replace the
-  // result.
+  // Without a report next to the result, the result's scene is unknown. So the build does not
+  // replace the result.
   ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", "m.vdag", "--report", "none"}).status, 0);
   ASSERT_EQ(remove(folder_.file("m.vdag.report.json").c_str()), 0);
   expect_error(2, "no report shows that n.glb is its scene", other);

@@ -44,7 +44,8 @@ TEST_F(Extract, LargeResultsWithinLittleMemory) {
   EXPECT_LE(part["peak_rss_bytes"], kAllowed);
 }
 
-// By majority, a solid keeps its volume at a coarser level. Files with colors are refused.
+// With --majority, a solid keeps about the same volume at a coarser level. Files with colors are
+// refused.
 TEST_F(Extract, Majority) {
   ASSERT_EQ(run({"generate", "menger", "b.glb", "--level", "1"}).status, 0);
   const Json solid = run_json({"build", "b.glb", "-r", "256", "--solid", "winding", "--bounds",

@@ -83,7 +83,7 @@ TEST_F(UnusualInput, ClientsRefuseNamesThatAreNotUtf8) {
   const Json report = run_json(client({"download", id, "-o", "d\xff.vdag"}));
   EXPECT_EQ(report.at("output"), "d" + std::string(kReplacement) + ".vdag");
   EXPECT_TRUE(exists("d\xff.vdag"));
-  // download overwrites an existing file only if it is an earlier result.
+  // Without --force, download replaces an existing file only if it is a .vdag file.
   put("notes.txt", "mine");
   expect_refused("notes.txt", client({"download", id, "-o", "notes.txt"}));
   run_json(client({"download", id, "-o", "notes.txt", "--force"}));

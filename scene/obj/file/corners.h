@@ -1,5 +1,5 @@
-// The corners of an OBJ face: v, v/vt, v//vn or v/vt/vn, with indices that count from 1, or from
-// the end of the preceding statements if they are negative.
+// The corners of an OBJ face: v, v/vt, v//vn or v/vt/vn, with indices that count from 1 or, if they
+// are negative, back from the last statement before the face.
 #pragma once
 
 #include <algorithm>
@@ -52,7 +52,7 @@ inline bool next_corner(std::string_view& arguments, Corner& out) {
   return arguments.empty() || is_blank(arguments.front());
 }
 
-// What a pass over the file must know about the corners of a face.
+// Facts about the corners of a face, which the first pass over the file collects.
 struct FaceCorners {
   size_t count = 0;  // number of corners
   bool lacks_texture =

@@ -23,12 +23,12 @@ class FaceReader {
     std::vector<uint32_t> materials;  // number in ObjFile::materials()
   };
 
-  // `cursors` is the number of cursors that share the memory. The file must outlive the reader.
+  // `cursors` is the number of cursors that share the budget. The file must outlive the reader.
   FaceReader(const ObjFile& obj, unsigned cursors, MemoryBudget& budget);
 
   // Writes the vertex indices of triangles [first, first + count) to `corners`, three per triangle,
   // and replaces `surfaces`, if it is not null. The triangles must exist, but their indices may be
-  // out of range. Throws Error{kInvalidInput} with face and line for a corner that is no index.
+  // out of range. Throws Error{kInvalidInput} with face and line for a corner that is not an index.
   void read(uint64_t first, uint64_t count, uint32_t* corners, Surfaces* surfaces);
   // Returns the face and line of a triangle, for messages.
   std::string place_of(uint64_t triangle);
@@ -51,9 +51,9 @@ class FaceReader {
 
   const ObjFile& obj_;
   PolygonReader polygons_;
-  std::unique_ptr<Splitter> splitter_;  // if a face is not a fan
-  // The first triangle of the current face, and its triangles if it is not a fan. Valid only if
-  // is_loaded_ is true.
+  std::unique_ptr<Splitter> splitter_;  // null if all faces are fans around their first corner
+  // The first triangle of the current face, and the triangles of the face if they are not a fan.
+  // Valid only if is_loaded_ is true.
   bool is_loaded_ = false;
   uint64_t first_triangle_ = 0;
   std::span<const uint32_t> split_;

@@ -34,8 +34,8 @@ inline bool next_number(std::string_view& arguments, double& out) {
   return true;
 }
 
-// Reads up to `max` numbers. Returns how many numbers there are before the end of the arguments, a
-// comment, or a word that is not a number; `arguments` is then the rest.
+// Reads up to `max` numbers, and returns how many it has read. Stops at the end of the arguments,
+// at a comment, or at a word that is not a number. `arguments` is then the rest.
 inline size_t read_numbers(std::string_view& arguments, double* out, size_t max) {
   size_t count = 0;
   while (count < max && has_word(arguments) && next_number(arguments, out[count])) ++count;

@@ -196,8 +196,9 @@ void ObjFile::add_warnings(const Scan& scan) {
   add("unknown-statements", scan.unknown, unknown.c_str());
 }
 
-// Counts the faces of each material that lack texture coordinates again. The first pass cannot know
-// that an index exceeds the number of all vt statements, because some may follow the face.
+// Counts again, for each material, the faces that lack texture coordinates. The first pass cannot
+// count faces whose indices exceed the number of vt statements, because vt statements may follow a
+// face.
 void ObjFile::count_faces_without_texture(MemoryBudget& budget, const CancelToken& cancel) {
   for (UsedMaterials::Use& use : materials_.all()) use.faces_without_texture = 0;
   PolygonReader polygons(*this, budget);
@@ -213,8 +214,8 @@ void ObjFile::count_faces_without_texture(MemoryBudget& budget, const CancelToke
   }
 }
 
-// Sets has_splits for each block with a face that cannot be triangulated as a fan around its first
-// corner. Warns about faces whose edges cross.
+// Sets has_splits of each block of faces (block_index.h) that has a face which cannot be
+// triangulated as a fan around its first corner. Warns about faces whose edges cross.
 void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   PolygonReader polygons(*this, budget);
   Positions vertices(*this, budget);

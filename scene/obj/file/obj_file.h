@@ -36,7 +36,7 @@ class ObjFile {
     uint64_t first_triangle;
     uint64_t vertices, texcoords;  // number of v and vt statements before the face
     uint32_t material;             // number in materials()
-    bool has_splits = false;       // true if some faces of the block are not fans
+    bool has_splits = false;       // some faces of the block are not fans (triangulator.h)
   };
   struct Library {
     std::string names;  // the arguments of the statement

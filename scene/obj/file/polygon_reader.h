@@ -24,11 +24,11 @@ class PolygonReader {
   // Moves to the polygon at `place`, whose number is `face`.
   void seek(const ObjFile::FacePlace& place, uint64_t face);
   // Reads the next polygon, which must exist. Throws Error{kInvalidInput} with face and line for a
-  // corner that is no index.
+  // corner that is not an index.
   void next();
 
-  // Return the number of the polygon, its corners and their vertex indices, which may be out of
-  // range, and its material.
+  // Return the polygon's number, its number of corners, the vertex indices of its corners (which
+  // may be out of range), and its material as a number in ObjFile::materials().
   uint64_t face() const { return next_face_ - 1; }
   size_t size() const { return corners_.size(); }
   std::span<const uint32_t> vertices() const { return vertices_; }

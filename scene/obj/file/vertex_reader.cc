@@ -35,8 +35,8 @@ void StatementReader::seek(uint64_t first) {
   next_ = block;
 }
 
-// Returns the arguments of the next statement of the kind `kind_`. Throws if the file has no
-// further one, because then it has changed.
+// Returns the arguments of the next statement of the kind `kind_`. Throws if none is left: then the
+// file has changed since it was opened.
 std::string_view StatementReader::next() {
   while (lines_.next()) {
     const Statement statement = statement_of(lines_.text());

@@ -11,7 +11,7 @@ namespace {
 struct MapOption {
   std::string_view name;
   size_t max_numbers;             // 0: the option takes a word
-  std::string_view neutral = {};  // word that does not change the lookup; "": no word does
+  std::string_view neutral = {};  // word that keeps the lookup unchanged; "": every word does
 };
 
 constexpr MapOption kMapOptions[] = {

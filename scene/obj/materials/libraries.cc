@@ -58,8 +58,8 @@ class LibraryList {
   }
 
  private:
-  // Opens and adds a library. Returns false, with a warning about the statement `from` unless it is
-  // null, if the library cannot be opened.
+  // Opens a library and adds its materials. If the library cannot be opened, returns false, and
+  // warns about the statement `from` unless `from` is null.
   bool open(const std::string& name, const ObjFile::Library* from) {
     std::unique_ptr<ReadableFile> file;
     try {

@@ -26,7 +26,7 @@ struct LibraryEntry {
 
 struct Libraries {
   std::vector<SourceFile> files;
-  // The materials of all libraries. If several libraries have a material of one name, only the
+  // The materials of all libraries. If several libraries have a material of the same name, only the
   // first library's material is listed.
   std::vector<LibraryEntry> materials;
   std::unordered_map<std::string, uint32_t> numbers;  // index in `materials` by name

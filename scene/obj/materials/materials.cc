@@ -51,7 +51,7 @@ class MaterialList {
   }
 
  private:
-  // Appends a material, with its name in SceneMaterials::names, and returns its index.
+  // Appends a material, and its name to SceneMaterials::names. Returns the material's index.
   uint32_t list(Material material) {
     material.number = static_cast<uint32_t>(result_.scene.names.size());
     result_.scene.names.push_back(material.name);
@@ -74,8 +74,9 @@ class MaterialList {
     return {.material = list(std::move(white))};
   }
 
-  // Returns the appearance of the faces that use material `number` of the libraries. This is also
-  // the material's index in the scene, because make() first appends all materials of the libraries.
+  // Returns the appearance of the faces that use material `number` of the libraries. The number is
+  // also the material's index in the scene, because make() first appends all materials of the
+  // libraries.
   ObjMaterials::Use use_listed(const UsedMaterials::Use& use, uint32_t number) {
     const LibraryEntry& entry = listed_.materials[number];
     const LibraryMaterial& in = entry.material;

@@ -37,7 +37,7 @@ class LibraryReader {
   static constexpr size_t kNone = ~size_t{0};
   static constexpr uint64_t kNodeBytes = 96;  // bytes of a hash table's node
 
-  // True if read_statement() reads the statement.
+  // True if read_statement() reads statements with this keyword.
   static bool is_color_statement(std::string_view keyword) {
     constexpr std::string_view kColorKeywords[] = {"Kd", "d", "Tr", "map_Kd", "map_d"};
     return std::ranges::any_of(

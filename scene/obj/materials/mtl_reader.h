@@ -1,5 +1,5 @@
-// Reads a library of materials (.mtl): of each material the diffuse color, the opacity and the
-// diffuse image.
+// Reads a library of materials (.mtl). For each material, reads the diffuse color, the opacity and
+// the diffuse image.
 #pragma once
 
 #include <array>
@@ -26,14 +26,14 @@ struct ImageMap {
 struct LibraryMaterial {
   std::string name;
   std::array<double, 3> diffuse{1, 1, 1};
-  bool is_dissolved = false;  // true if the file gives `opacity` by d
+  bool is_dissolved = false;  // true if a statement d, not Tr, gives `opacity`
   double opacity = 1;
   ImageMap diffuse_map, opacity_map;
 };
 
-// Returns the materials of a library, in the order of the file. If a name occurs again, its last
-// definition replaces the first, with a warning. Invalid and unsupported statements give warnings.
-// Throws Error{kOutOfMemory} and Error{kLimit}.
+// Returns the materials of a library, in the order of the file. If a name occurs again, the later
+// definition replaces the earlier one, with a warning. Invalid and unsupported statements give
+// warnings. Throws Error{kOutOfMemory} and Error{kLimit}.
 std::vector<LibraryMaterial> read_library(const ReadableFile& file, MemoryBudget& budget,
                                           GrowingCharge& charge, WarningList& warnings);
 

@@ -88,7 +88,7 @@ class HeaderParser {
   }
 
   // Moves past a line end: LF, CR LF or CR. If all earlier lines end with CR alone, an LF after CR
-  // may be the first byte of the data. So it does not count as a part of the line end.
+  // may be the first byte of the data. So this LF does not count as a part of the line end.
   void end_line() {
     if (at_ == text_.size()) {
       if (is_whole_file_) refuse("has no end, expected a header that ends with end_header");

@@ -70,7 +70,7 @@ class BinaryRows : public Rows {
   }
 
  private:
-  // A list, or a requested number.
+  // One step of reading a row: a list, or a requested number.
   struct Step {
     size_t bytes_before;  // bytes between the previous step and this one
     size_t property;

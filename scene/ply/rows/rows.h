@@ -24,7 +24,7 @@ struct RequestedProperties {
 
   size_t indices = kNone;       // a list of integers: vertex indices
   size_t reals = kNone;         // a list of numbers
-  std::vector<size_t> numbers;  // properties that are no lists
+  std::vector<size_t> numbers;  // properties that are not lists
 };
 
 class Rows {

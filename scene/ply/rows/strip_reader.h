@@ -1,8 +1,8 @@
 // Reads the triangles of the element tristrips of a PLY file. Each row is a list of vertex indices.
 // Every three consecutive indices are a triangle. In every second triangle, the first two corners
 // are exchanged, so that all triangles have the same orientation. The index -1 begins a new strip.
-// The largest number of an unsigned type also does, if no vertex has this index. Triangles with two
-// equal indices only join parts of a strip, and are left out.
+// The largest number of an unsigned type also begins a strip, if no vertex has this index.
+// Triangles with two equal indices only join parts of a strip, and are left out.
 //
 // A row may have any number of entries, so position() and seek() also work within a row. Not
 // thread-safe.

@@ -24,7 +24,7 @@ TEST(GltfContainer, EveryTruncationIsRefused) {
   }
 }
 
-// Headers whose lengths do not fit each other are refused.
+// Headers whose lengths contradict each other are refused.
 TEST(GltfContainer, LyingHeaders) {
   const std::string whole = one_triangle().glb();
   const auto with = [&](size_t offset, uint32_t value) {
@@ -335,8 +335,8 @@ TEST(GltfMemory, ElementsAreCharged) {
   }
 }
 
-// The parser collects some data of members that are not read. This memory is charged, and a number
-// has at most 1024 characters. White space takes no memory.
+// The parser collects some data of members that are not read. This memory is charged. A number of
+// over 1024 characters is refused. White space takes no memory.
 TEST(GltfMemory, WhatTheParserCollectsIsBounded) {
   const std::string rest = R"("asset":{"version":"2.0"}})", blanks(4 << 20, ' ');
   EXPECT_EQ(out_of_memory_message("{" + blanks + rest, uint64_t{2} << 20), "");

@@ -230,7 +230,7 @@ TEST(GltfGeometry, QuantizedPositions) {
   EXPECT_EQ(first_corner(u16, kU16, false), (Point{65535, 1, 0}));
 }
 
-// Points and lines make no triangles, which a warning reports. Their vertices may be anything.
+// Points and lines make no triangles, which a warning reports. Their vertices may have any values.
 TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
   SceneBuilder scene = one_triangle();
   const int positions = scene.add_positions({50, 50, 50, 60, 60, 60, 70, 70, 70});
@@ -245,7 +245,8 @@ TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
   EXPECT_EQ(open.source->warnings()[0].count, 4u);
 }
 
-// Corners that fill no triangle are ignored with a warning.
+// The last one or two corners of a list, which are not enough for a triangle, are ignored with a
+// warning.
 TEST(GltfGeometry, LeftoverCornersAreNamedInAWarning) {
   SceneBuilder scene;
   const int positions = scene.add_positions(kSquare);

@@ -30,9 +30,9 @@ TEST(Surfaces, TextureCoordinatesAndColorsOfCorners) {
   EXPECT_EQ(all[0].position.v[1][0], 1);
 }
 
-// The front of a triangle is the side on which its corners are counterclockwise. It is the other
-// side for every second triangle of a strip, and for triangles of a mirrored node. If both apply,
-// it is the first side again.
+// The front of a triangle is the side on which its corners are counterclockwise. For every second
+// triangle of a strip, and for triangles of a mirrored node, the front is the other side. If both
+// apply, the front is the counterclockwise side again.
 TEST(Surfaces, FlippedInStripsAndMirrors) {
   const auto flips_of = [](int mode, Json node) {
     SceneBuilder scene = one_triangle();

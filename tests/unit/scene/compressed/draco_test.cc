@@ -59,7 +59,7 @@ TEST(GltfDraco, EqualsTheDecodedScene) {
   }
 }
 
-// Adds texture coordinates linear in the positions, so that the encoder predicts them from these.
+// Adds texture coordinates that the encoder can predict: linear functions of the positions.
 void add_texture_coordinates(draco::Mesh& mesh) {
   draco::GeometryAttribute texture;
   texture.Init(draco::GeometryAttribute::TEX_COORD, nullptr, 2, draco::DT_FLOAT32, false, 8, 0);
@@ -73,8 +73,8 @@ void add_texture_coordinates(draco::Mesh& mesh) {
   }
 }
 
-// Tests every speed of the encoder. Together, the data use edgebreaker connectivity with valences,
-// all predictions, and raw and tagged symbols.
+// Tests every speed of the encoder. Together, the encoded meshes use edgebreaker connectivity with
+// valences, all predictions, and raw and tagged symbols.
 TEST(GltfDraco, AllEncodersAreRead) {
   for (const uint32_t n : {3u, 40u})
     for (const bool with_normals : {false, true})
@@ -281,7 +281,7 @@ TEST(GltfDraco, CountsThatTheHeaderDoesNotShow) {
             triangles_of_file(plain_scene(*mesh).glb()));
 }
 
-// The accessors of colors and texture coordinates follow the corrected count of the positions.
+// All attributes have the data's vertex count, even if their accessors declare other counts.
 TEST(GltfDraco, SurfacesHaveTheCountsOfTheData) {
   auto mesh = bumpy_grid(4, false);
   draco::GeometryAttribute color;
@@ -474,7 +474,7 @@ TEST(GltfDraco, WhatDoesNotFitTheBudgetIsRefused) {
 
 #else
 
-// Without the library a file is refused, unless it has the same geometry uncompressed.
+// Without the Draco library a file is refused, unless it has the same geometry uncompressed.
 TEST(GltfDraco, IsRefusedWithoutTheLibrary) {
   const Error error = error_of_file(compressed_scene({'D', 'R', 'A', 'C', 'O'}, 3, 3).glb());
   EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);

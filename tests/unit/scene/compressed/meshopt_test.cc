@@ -91,7 +91,7 @@ TEST(GltfMeshopt, EqualsTheDecodedScene) {
 }
 
 // The data are in the form that gltfpack writes: 16-bit positions with KHR_mesh_quantization, and
-// the sequence of a strip.
+// the indices of a strip, encoded as a sequence.
 TEST(GltfMeshopt, QuantizedPositionsAndStrips) {
   const auto positions = grid_positions<uint16_t>(1);
   std::vector<uint32_t> strip;
@@ -277,7 +277,8 @@ TEST(GltfMeshopt, DamagedDataAreErrors) {
   EXPECT_GT(refused, 0u);
 }
 
-// A few bytes can declare a huge count. It is refused before memory is allocated.
+// A few bytes can declare a huge count. A file with such a count is refused before memory is
+// allocated.
 TEST(GltfMeshopt, WhatDoesNotFitTheBudgetIsRefused) {
   SceneBuilder scene;
   const size_t count = size_t{1} << 24;
@@ -293,7 +294,7 @@ TEST(GltfMeshopt, WhatDoesNotFitTheBudgetIsRefused) {
 
 #else
 
-// Without the library a file is refused, unless it has the same geometry uncompressed.
+// Without the meshopt library a file is refused, unless it has the same geometry uncompressed.
 TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
   SceneBuilder scene;
   const int p = add_compressed(scene, {1, 2, 3}, 3, 12, "ATTRIBUTES");

@@ -141,8 +141,8 @@ TEST(Polygon, LargeShapesAreCovered) {
 }
 
 // Polygons that a fan of triangles from the first corner covers are divided into this fan: convex
-// polygons, and others of which the first corner sees every point. So are polygons whose
-// coordinates are floats and that are convex up to rounding.
+// polygons, and others of which the first corner sees every point. The same holds for polygons
+// whose coordinates are floats and that are convex up to rounding.
 TEST(Polygon, FansAreKept) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");
