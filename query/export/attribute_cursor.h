@@ -1,5 +1,5 @@
-// Reads the attributes of selected cells, for formats that store a table with a few numbers for
-// each attribute.
+// Reads the attributes of selected cells as numbers, for formats that store an attribute as a
+// table: one row per cell, with one number per component, such as the three bytes of a color.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// Exports several selections of one file in one format. If the format or the user requests other
-// axes, all of these exports use the same turned copy of the DAG.
+// Exports several selections of one file in one format. If the axes must be turned (axis_turn.h),
+// all of these exports use the same turned copy of the DAG.
 #pragma once
 
 #include <optional>

@@ -39,8 +39,8 @@ constexpr ExportFormat kFormats[] = {
      " outside watertight"},
 };
 
-// Returns the turn of the DAG (axis_turn.h) that makes the file's y axis point along `up`. Without
-// a turn, the format's writer makes it point along format.up.
+// Returns the turn (axis_turn.h) after which the y axis of the .vdag file points along `up` in the
+// exported file. Without a turn, this axis points along format.up.
 AxisTurn turn_of(const ExportFormat& format, UpAxis up) {
   if (up == UpAxis::kOfFormat || up == format.up) return {};
   return up == UpAxis::kZ ? kTurnYToZ : kTurnZToY;

@@ -35,7 +35,7 @@ struct ExportReport {
 // default of the format.
 enum class UpAxis { kOfFormat, kY, kZ };
 
-// Options that only some formats have, except `up`, which all formats have.
+// All formats have the option `up`; only some formats have the other options.
 struct ExportOptions {
   UpAxis up = UpAxis::kOfFormat;
   std::string grid;         // vdb, nvdb: density, mask or sdf; "" means density
@@ -53,7 +53,7 @@ struct ExportFormat {
   const char* suffix;
   const char* second_suffix;
   ExportReport (*write)(const ExportJob& job);
-  UpAxis up = UpAxis::kY;    // default axis for the file's y axis
+  UpAxis up = UpAxis::kY;    // the axis that kOfFormat means
   const char* options = "";  // names of ExportOptions except `up`, each after a space: " grid"
 };
 
@@ -81,10 +81,11 @@ struct ExportRequest {
 };
 
 // Writes the selected voxels. The files get their final names when all of them are complete. After
-// an error no file remains, except if the first of two renames succeeded and the second failed. If
-// the process is killed, the next export to the same output removes its files. Throws Error{kLimit}
-// if the format cannot hold the voxels, Error{kOutOfMemory} if they do not fit in memory_bytes (the
-// message names a selection that fits), and the errors of LockedOutputs.
+// an error no file remains, with one exception: if the rename of the second of two files fails, the
+// first file remains. If the process is killed, the next export to the same output removes its
+// files. Throws Error{kLimit} if the format cannot hold the voxels, Error{kOutOfMemory} if they do
+// not fit in memory_bytes (the message names a selection that fits), and the errors of
+// LockedOutputs (query/dag/locked_outputs.h).
 ExportReport export_dag(FileSystem& files, const voxdag_reader::File& file,
                         const ExportRequest& request, Progress& progress,
                         const CancelToken& cancel);

@@ -47,7 +47,7 @@ class ExportFile {
   uint64_t buffer_offset_ = 0;  // offset of buffer_ in the file
   uint64_t size_ = 0;
   bool published_ = false;
-  std::optional<TemporaryPath> registered_;  // the partial file, until it is published
+  std::optional<TemporaryPath> registered_;  // registers the partial file until publish()
 };
 
 }  // namespace voxdag::query

@@ -55,7 +55,8 @@ struct ExportJob {
   }
 };
 
-// Reports a stage of the progress, and checks for cancellation. The destructor ends the stage.
+// Reports a stage of the export's progress. Every 4096th call of advance() reports, and checks for
+// cancellation. The destructor ends the stage.
 class ExportStage {
  public:
   ExportStage(const ExportJob& job, std::string_view name, uint64_t total, std::string_view unit)
@@ -107,8 +108,8 @@ Selection coarser(const Selection& selection, uint32_t grid_levels);
 // region is in cells of the coarser grid and in the axes of the file.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
-// Publishes the files and returns their total size in bytes. If a part of the input could not be
-// read (WatchedFile), throws Error{kIo} instead.
+// Publishes the files and returns their total size in bytes. If a read of the input file has failed
+// (watched_file.h), throws Error{kIo} instead.
 inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> written) {
   job.watched.check_readable();
   return ExportFile::publish(written);
@@ -118,8 +119,8 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
 void require_space(const ExportJob& job, uint64_t bytes);
 
 // Throws Error{code} with a message such as "OUTPUT: PROBLEM. --level 11 fits", where 11 is the
-// finest coarser level that fits. If no coarser level fits, the message ends with "Expected a
-// smaller --region". fits(grid_levels) returns true if the selection fits on that coarser grid.
+// finest of the coarser levels that fit. If no coarser level fits, the message ends with "Expected
+// a smaller --region". fits(grid_levels) returns true if the selection fits on that coarser grid.
 [[noreturn]] void refuse_size(const ExportJob& job, const std::string& problem,
                               const std::function<bool(uint32_t grid_levels)>& fits,
                               ErrorCode code = ErrorCode::kLimit);
@@ -128,7 +129,8 @@ void require_space(const ExportJob& job, uint64_t bytes);
 // an arbitrary number over `limit`.
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit);
 // Determines on which coarser grids the job's selection has at most `limit` set cells. Call fits()
-// for the coarsest grid first. Counts in the first of these ways that is possible:
+// for the coarsest grid first, then for finer grids. Counts the cells in the first of these ways
+// that is possible:
 // 1. If the complete grid is selected, LevelCells reads each level once for all calls together.
 //    It needs memory for the nodes of two levels.
 // 2. NodeCounts reads each node once per call. It needs memory for a count per node.
@@ -141,7 +143,7 @@ class CellLimit {
  private:
   const ExportJob& job_;
   const uint64_t limit_;
-  std::optional<LevelCells> cells_;  // only for a complete file, if the memory can hold them
+  std::optional<LevelCells> cells_;  // if the complete grid is selected and memory suffices
 };
 
 // Returns the number of set cells of the job's selection. If this number is over `limit`, throws

@@ -38,8 +38,8 @@ class LevelCells {
   };
 
   Level level(uint32_t depth) const;
-  // Calls visit(children, places) for each node of level_ in the span number `span` of
-  // level_.index. `places` is the node's number of occurrences.
+  // Calls visit(children, places) for each node of level_ that begins in the span (node_index.h)
+  // with the number `span`. `places` is the node's number of occurrences.
   template <class Visit>
   void visit_span(uint64_t span, const Visit& visit) const;
   void descend();

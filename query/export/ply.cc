@@ -13,7 +13,7 @@
 namespace voxdag::query {
 namespace {
 
-// Most readers count vertices in 32-bit integers.
+// Most readers count vertices in signed 32-bit integers.
 constexpr uint64_t kMaxPlyVertices = (uint64_t{1} << 31) - 1;
 
 std::string property_lines(const AttributeCursor& attribute) {

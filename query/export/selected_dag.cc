@@ -24,8 +24,8 @@ template <class Slot>
 class SlotTable {
  public:
   explicit SlotTable(MemoryBudget& budget) : budget_(budget) {}
-  // Returns the slot for which is_it(slot) is true. Otherwise returns a free slot, which the caller
-  // must fill, and which already counts as used.
+  // Returns the slot with this hash for which is_it(slot) is true. If no slot matches, returns a
+  // free slot, which the caller must fill, and which already counts as used.
   template <class IsIt>
   Slot& find(uint64_t hash, const IsIt& is_it) {
     if (4 * (used_ + 1) > 3 * slots_.size()) grow();

@@ -1,8 +1,8 @@
 // The selected cells as a DAG of the selection's grid, for formats that share equal subtrees. If
-// the complete file is selected and all its pointers have 32 bits, this DAG is the file's levels in
-// place. Otherwise, the DAG is built in memory that is charged to the budget. Subtrees that become
-// equal because the region clips them are also shared. A node of the file that is completely inside
-// the region is visited only once.
+// the complete file is selected and all its pointers have 32 bits, this DAG refers to the file's
+// levels without a copy. Otherwise, the DAG is built in memory that is charged to the budget.
+// Subtrees that become equal because the region clips them are also shared. A node of the file that
+// is completely inside the region is visited only once.
 //
 // Levels have the layout of the global file. A node is its child mask and the word offsets of its
 // children in the next level, one word each. A brick is two words, low half first.

@@ -186,7 +186,8 @@ class VoxWriter {
           depth_, [&](uint64_t offset, uint32_t, std::span<const uint32_t>) { visit(offset); });
   }
 
-  // Returns the content of a model's node; DagView defines `content`.
+  // Returns the content (as in DagView) of the model's node at this word offset. The content
+  // differs from the offset only in a grid of one brick.
   uint64_t content_at(uint64_t offset) const {
     return depth_ + kBrickLevels == view_.grid_levels() ? view_.root() : offset;
   }

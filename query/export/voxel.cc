@@ -21,7 +21,7 @@ constexpr uint64_t kMaxVoxelWords = uint64_t{1} << 24;  // limit of a 24-bit ind
 constexpr uint32_t kSolid = 0xff000000;
 constexpr uint64_t kFullBrick = ~uint64_t{0};
 
-// Converts child 4x + 2y + z to 4z + 2y + x, and back.
+// Converts the index 4x + 2y + z of a child to 4z + 2y + x, or back.
 constexpr int reversed_child(int child) { return (child & 1) << 2 | (child & 2) | child >> 2; }
 
 uint64_t leaf_bits(uint64_t brick) {

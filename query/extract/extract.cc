@@ -37,7 +37,7 @@ namespace {
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
-constexpr unsigned kMaxWorkers = 256;  // each has a file open
+constexpr unsigned kMaxWorkers = 256;  // each has an open file
 // Estimated memory per node while the DAG of a cube is built. It gives the initial number of cubes.
 constexpr uint64_t kBytesPerNode = 128;
 // If the levels that are read have at most this number of nodes in total, the complete grid is one
@@ -179,7 +179,7 @@ uint64_t Extraction::wanted_parts(unsigned workers, uint64_t share_bytes) const 
 }
 
 // Divides the cube of the new grid, level by level, into cubes that intersect the selection's
-// region. Stops when there are at least `wanted` of them or when they are bricks.
+// region. Stops when there are at least `wanted` such cubes, or when the cubes are bricks.
 std::vector<SelectedPart> Extraction::first_parts(Worker& worker, uint64_t wanted) const {
   if (file_.empty()) return {};
   std::vector<SelectedPart> parts{{}};
@@ -300,7 +300,7 @@ ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, 
   check_grid(spec.selection, file.grid_levels());
   if (spec.majority) refuse_attributes(file, "which an extract by majority cannot keep");
   LockedOutputs outputs(files, {{spec.output}, {file.path()}, spec.replace});
-  const WatchedFile watched(file);  // colors are read in place
+  const WatchedFile watched(file);  // colors are read from the mapped file
   return watched.run([&] {
     return Extraction(file, spec, outputs.files(), progress, cancel).run([&] {
       watched.check_readable();

@@ -62,7 +62,7 @@ Cube crop_cube(const Selection& selection);
 // Temporary files are in a folder next to the output; extract() removes the folder at the end, also
 // after an error. If the process is killed, the next extract with the same output removes the
 // folder. Throws Error: kInvalidInput for attributes with `majority`, kCorrupt for a damaged file,
-// kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs.
+// kNoSpace, kOutOfMemory, kCanceled, and the errors of LockedOutputs (query/dag/locked_outputs.h).
 ExtractReport extract(const voxdag_reader::File& file, const ExtractSpec& spec, FileSystem& files,
                       Progress& progress, const CancelToken& cancel);
 

@@ -13,8 +13,9 @@
 namespace voxdag::query {
 namespace {
 
-// Divisors of the free memory. They give the memory for the voxel counts of one level, of which two
-// levels are in memory at any time, and for the windows of lookups (query/combine/node_values.h).
+// The free memory divided by these numbers limits three parts: the voxel counts of one level (two
+// levels are in memory at any time), a window of lookups, and a list of SpillSpace
+// (query/combine/node_values.h, spill.h).
 constexpr uint64_t kCountShare = 4;
 constexpr uint64_t kCountWindowShare = 32;
 constexpr uint64_t kCountListShare = 1024;
@@ -108,7 +109,7 @@ MajorityCells::MajorityCells(const voxdag_reader::File& file, uint32_t grid_leve
     progress.advance(1);
   }
   progress.end_stage();
-  file.release_pages();  // the extract reads the file with read calls
+  file.release_pages();  // extract() reads with read calls from here on
 }
 
 uint8_t MajorityCells::octants(uint64_t mask) {

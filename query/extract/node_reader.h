@@ -75,8 +75,9 @@ class NodeReader {
     for_each(
         level, wanted, [](std::span<const uint32_t>) {}, visit);
   }
-  // Like the other for_each(), but also calls ahead(words) for most nodes, eight nodes before the
-  // call of visit(), so that ahead() can prefetch memory that visit() will read.
+  // Like the other for_each(), but also calls ahead(words) for most nodes, so that ahead() can
+  // prefetch memory that visit() will read. The call for a node comes eight nodes before visit() of
+  // this node.
   template <class Ahead, class Visit>
   void for_each(uint32_t level, std::span<const WantedNode> wanted, Ahead&& ahead, Visit&& visit);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
 // For n nodes of a level, memory for kExpectedChildren * n nodes is reserved in the next finer
-// level. Nodes of surfaces have twice this number of children on average.
+// level. Nodes of surfaces have four children on average, but often share them.
 constexpr uint64_t kExpectedChildren = 2;
 constexpr uint64_t kPrefetchAhead = 8;  // nodes
 
@@ -120,7 +120,8 @@ uint8_t PartBuilder::cells_of_node(const voxdag_reader::Node& node) const {
   return majority_ ? majority_->children(node) : static_cast<uint8_t>(node.child_mask);
 }
 
-// Returns the octants of each node or brick that are set as cells of the selected grid.
+// Reads the file's nodes or bricks that are one level above the cells of the selected grid.
+// Returns, by node number, the mask of the octants that are set cells.
 PooledArray<uint8_t> PartBuilder::read_cells(PartLevel& nodes) {
   const uint32_t level = brick_level() + 1;
   const PartLevel::Sorted sorted = nodes.sort();

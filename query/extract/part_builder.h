@@ -81,8 +81,8 @@ class PartBuilder {
   }
   int64_t edge(uint32_t level) const { return int64_t{1} << (selection_.grid_levels - level); }
 
-  // Reads the nodes of a level. Calls visit(number, node) for each, which must add the node's
-  // children to `below` and `children`.
+  // Reads the nodes of a level. Calls visit(number, node) for each node. visit() must add the
+  // node's children to `below` and `children`.
   template <class Visit>
   void read(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children, Visit visit);
   void read_nodes(uint32_t level, PartLevel& nodes, PartLevel& below, Children& children);

@@ -33,8 +33,9 @@ constexpr uint64_t kWorkerBytes =
     kMaxRegionCells * (sizeof(ColoredCell) * 9 / 8 + 2 * sizeof(Color)) +
     CheckedReader::kBlockBytes;
 // Returns an upper bound on the size of an encoded region, in bytes. A color takes half a byte (16
-// bytes per 32 cells), another value value_bytes(). The factors are 3/4 and 5/4 instead of 1/2 and
-// 1, because a region also has its coarser cells (up to 1/7 as many) and prefixes (docs/format.md).
+// bytes per 32 cells); a value of another attribute takes value_bytes(). The factors are 3/4 and
+// 5/4 instead of 1/2 and 1, because a region also has its coarser cells (up to 1/7 as many) and
+// prefixes (docs/format.md).
 uint64_t encoded_bytes(const voxdag_reader::File& file, Attribute attribute) {
   if (traits_of(attribute).is_color()) return kMaxRegionCells * 3 / 4;
   return kMaxRegionCells * 5 / 4 *
@@ -161,8 +162,8 @@ class PartColors {
   }
 
   // Encodes a region of an attribute other than color. The values of coarser cells are computed
-  // from the finest cells. So a cell that the selection's region does not cut has the same value as
-  // in the file.
+  // from the finest cells by the attribute's rule, as in the file. So a cell that the selection's
+  // region does not cut has the same value as in the file.
   EncodedRegion encode_valued(const PlacedCube& cube) const {
     voxdag_reader::ColorCursor cursor(file_, section_);
     std::vector<ValuedCell> cells;
@@ -233,8 +234,8 @@ class PartColors {
                    int index) const {
     return {cube.code << 3 | static_cast<uint64_t>(index), dag_.content(level, children, index)};
   }
-  // Calls visit(cube) for all cubes with selected cells on the level `target`, inside `cube` on
-  // `level`.
+  // Calls visit() for each cube of the level `target` that is inside `cube` and has selected cells.
+  // `level` is the level of `cube`.
   template <class Visit>
   void walk(uint32_t level, const PlacedCube& cube, uint32_t target, const Visit& visit) const {
     if (!is_selected(level, cube)) return;
@@ -274,15 +275,15 @@ class PartColors {
     return copied;
   }
 
-  // Verifies the checksums of the colors of all cells in a cube, down to level `finest`.
+  // Verifies the checksums of the colors of a cube, which is at `code` on `level`, and of all its
+  // cells down to the level `finest`.
   void check_colors(uint32_t finest, uint32_t level, uint64_t code) {
     std::vector<std::byte> block(CheckedReader::kBlockBytes);
     for (uint32_t t = 0; t < section_.tier_count(); ++t) {
       const ColorTier& tier = section_.tier(t);
       const bool is_coarser = t > 0 && tier.finest_level < level;
       if (is_coarser || tier.region_level > finest) continue;
-      // The regions with colors of the cube are the ones with Morton codes from `begin` on and
-      // below `end`.
+      // The colors of the cube are in the regions with Morton codes from `begin` to end - 1.
       const bool within = tier.region_level < level;
       const uint32_t between = within ? level - tier.region_level : tier.region_level - level;
       const uint64_t begin = within ? code >> 3 * between : code << 3 * between;

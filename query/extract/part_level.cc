@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kDigitBits = 11;
 constexpr uint64_t kDigits = uint64_t{1} << kDigitBits;
-// Shorter lists are sorted by comparison.
+// Lists with fewer nodes than this are sorted by std::sort instead of the radix sort.
 constexpr uint64_t kFewToSort = 1 << 12;
 
 uint64_t digit_of(const WantedNode& node, int shift) {

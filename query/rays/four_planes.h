@@ -22,9 +22,9 @@ struct Crossed {
 
 // The planes at which rays enter a cell's children, or the planes at which they leave the children.
 // On each axis, a cell has lower and upper children; `lower` has the planes of the lower children,
-// and `upper` the planes of the upper children. Each has one number for the x, y and z axis; the
-// fourth number has no meaning. The numbers are coordinates of planes, or a ray's parameters at the
-// planes.
+// and `upper` the planes of the upper children. Each has one number for the x axis, one for y and
+// one for z; the fourth number has no meaning. The numbers are coordinates of planes, or a ray's
+// parameters at the planes.
 template <class Four>
 struct FourPlanes {
   Four lower, upper;

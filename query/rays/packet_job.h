@@ -18,8 +18,8 @@ inline constexpr int kPacketRays = 64;
 // A position in voxels, mirrored like the rays. The fourth number has no meaning.
 using Int4 = int32_t __attribute__((vector_size(16)));
 
-// A node or brick that a ray may cross, in a linked list for each ray. The ray enters this cell
-// after it has left all earlier cells of its list without a hit.
+// A node or brick that a ray may cross. Each ray has a linked list of such cells. It enters a cell
+// after it has left all earlier cells of the list without a hit.
 struct WaitingCell {
   Int4 low;         // low corner
   uint64_t offset;  // word offset in its level
@@ -27,8 +27,8 @@ struct WaitingCell {
   int32_t next;  // next cell of the same ray, or -1
 };
 
-// The descent of one ray that has left the packet and continues separately. Its path has the nodes
-// from the cell in which the descent began to the current cell.
+// The descent of one ray that has left the packet and continues separately. The descent's path has
+// the nodes from the cell in which the descent began to the current cell.
 struct RayDescent {
   static constexpr int kMaxLevels = 20;
   Int4 low;  // low corner of the cell that the ray enters next
@@ -70,7 +70,7 @@ struct PacketJob {
   alignas(64) double origin[3][kPacketRays], inverse[3][kPacketRays];
   PacketRay rays[kPacketRays];
   Hit* hits = nullptr;
-  uint64_t found = 0;   // bits of the rays with a hit; hits[ray] is the first cell
+  uint64_t found = 0;   // bits of the rays with a hit; hits[ray] is the first cell hit
   uint64_t single = 0;  // bits of the rays that RayCaster must cast
 
   // Rays that descend separately are collected and then advanced together in a round. A round

@@ -25,7 +25,8 @@
 namespace voxdag::query {
 namespace {
 
-// A table that mirrors child masks: bit i of `mask` is bit i ^ mirror of of[mirror][mask].
+// A table that mirrors child masks: the element of[mirror][mask] is `mask` with bit i moved to the
+// position i ^ mirror, for all i.
 struct MirroredMasks {
   uint8_t of[8][256] = {};
   constexpr MirroredMasks() {
@@ -181,8 +182,8 @@ class PacketWalk {
   }
 
   // Returns the children of a cell that at least one ray may cross or touch. Computes bounds of the
-  // ray parameters from the bounds of origins and inverse directions; rounding is monotonic, so it
-  // keeps them valid.
+  // ray parameters from the bounds of origins and inverse directions. These bounds are valid in
+  // spite of rounding, because rounding is monotonic.
   VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);
@@ -223,8 +224,8 @@ class PacketWalk {
     }
     return crossing & rays;
   }
-  // Divides the 64 bits of `rays` into groups of four. Returns the lowest bit of each group that
-  // contains a ray.
+  // Divides the 64 bits of `rays` into groups of four. Returns a mask with the lowest bit of each
+  // group that contains a ray.
   VOXDAG_INLINE static uint64_t groups_of(uint64_t rays) {
     rays |= rays >> 1;
     return (rays | rays >> 2) & 0x1111111111111111;

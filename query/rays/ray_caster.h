@@ -2,9 +2,9 @@
 //
 // A ray descends the octree from the root. At each node it descends into the children that it
 // crosses, nearest first. A ray's parameter t at a plane is the distance along the ray from its
-// origin to the plane. It is computed from the plane's integer coordinate, always by the same
-// formula. So the cells on both sides of a plane get the same t to the last bit, and there are no
-// cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
+// origin to the plane. The parameter is computed from the plane's integer coordinate, always by the
+// same formula. So the cells on both sides of a plane get the same t to the last bit, and there are
+// no cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
 //
 // A ray may widen into a cone. An occupied cell that is no larger than the width of the cone at the
 // cell counts as solid. So the descent ends where finer cells would be invisible.
@@ -42,8 +42,8 @@ class RayCaster {
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
   // Like the other cast(), but reads at most `steps_left` nodes and bricks, and subtracts the
-  // number of reads from `steps_left`. If `steps_left` is then 0, the search ended early, and a
-  // result of false does not mean that there is no hit.
+  // number of reads from `steps_left`. If `steps_left` is then 0, the search may have ended early,
+  // and a result of false does not mean that there is no hit.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,
             uint64_t& steps_left) const;
 

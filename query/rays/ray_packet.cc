@@ -53,8 +53,9 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
   return found;
 }
 
-// Mirrors and inverts the rays like MirroredRay, but with several divisions per operation. If there
-// are fewer than kRays rays, the first ray is also stored at the unused indices.
+// Mirrors the rays and inverts their directions like MirroredRay, but with several divisions per
+// operation. If there are fewer than kRays rays, the first ray is also stored at the unused
+// indices.
 void RayPacket::load(std::span<const Ray> rays) {
   const double edge = static_cast<double>(dag_.resolution());
   for (size_t i = 0; i < kRays; ++i) {

@@ -25,7 +25,8 @@ inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 // The file must outlive the object. Not thread-safe.
 class Albedo {
  public:
-  // `colors`: the file whose colors are shown. If it is null or has no colors, the result is gray.
+  // `colors`: the file whose colors are shown. If it is null or has no colors, all surfaces are
+  // gray.
   explicit Albedo(const voxdag_reader::File* colors) {
     if (colors && colors->has_colors()) cursor_.emplace(*colors);
   }

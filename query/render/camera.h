@@ -31,7 +31,7 @@ class Camera {
  private:
   Vec eye_, forward_, right_, up_;
   double pixel_;
-  double half_width_, half_height_;  // of the picture, in pixels
+  double half_width_, half_height_;  // half of the picture's size, in pixels
 };
 
 // Returns a placement from which `points` are centered in the picture and as large as possible. The

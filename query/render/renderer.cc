@@ -42,9 +42,10 @@ std::vector<SurfaceHit> probe_view(const DagView& dag, const Camera& camera, int
   return seen;
 }
 
-// Returns the factor by which all light is multiplied before tone mapping. It is chosen as if all
-// probed surfaces were of plaster: then their median light is a middle tone or darker, and 90% of
-// them are below white. The surfaces' own colors are ignored so that dark surfaces remain dark.
+// Returns the factor by which all light is multiplied before tone mapping. The factor is chosen as
+// if all probed surfaces were of plaster: then their median light is a middle tone or darker, and
+// 90% of them are below white. The surfaces' own colors are ignored so that dark surfaces remain
+// dark.
 double choose_exposure(const Lighting& lighting, const std::vector<SurfaceHit>& seen) {
   constexpr int kSkyRays = 8;
   if (seen.empty()) return 1;

@@ -15,7 +15,7 @@
 namespace voxdag::query {
 
 // The background, which pixels without a surface show: a gradient, white, or transparency. The
-// scene throws a shadow on a gradient or white background, but not on a transparent one.
+// scene casts a shadow on a gradient or white background, but not on a transparent one.
 enum class Background { kSky, kWhite, kTransparent };
 // Returns "sky", "white" and "transparent".
 const std::vector<std::string>& background_names();
@@ -27,7 +27,7 @@ struct RenderOptions {
   int samples = 2;  // along each side of a pixel: samples^2 samples per pixel
   unsigned threads = 1;
   Background background = Background::kSky;
-  // The DAG's file, for its colors; null for gray.
+  // The file whose colors are shown; null for gray surfaces.
   const voxdag_reader::File* colors = nullptr;
   // Any value except kColor replaces the colors. kNormal also omits light and haze.
   Shade shade = Shade::kColor;

@@ -51,7 +51,7 @@ Moments moments_around(const DagView& dag, const Hit& hit) {
   return m;
 }
 
-// Returns the normal of the plane that best fits the occupied cells near the hit. It is the
+// Returns the normal of the plane that best fits the occupied cells near the hit. The normal is the
 // eigenvector for the smallest eigenvalue of the covariance of these cells. If there are too few
 // cells for a plane, returns the normal of the face that the ray entered.
 Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
@@ -61,8 +61,8 @@ Vec plane_normal(const DagView& dag, const Hit& hit, const Vec& direction) {
   if (m.weight < 3) return face;
   Vec c[3];
   for (int i = 0; i < 3; ++i) c[i] = m.second[i] - m.first * (m.first[i] / m.weight);
-  // Normalizes the covariance and adds a small multiple of the identity matrix. Without it, the
-  // adjugate of a perfect plane's covariance could be zero.
+  // Normalizes the covariance and adds a small multiple of the identity matrix. Without this
+  // multiple, the adjugate of a perfect plane's covariance could be zero.
   const double trace = c[0][0] + c[1][1] + c[2][2];
   for (int i = 0; i < 3; ++i) c[i] = c[i] * (1 / trace), c[i][i] += 1e-3;
   // Finds the eigenvector by inverse iteration, with the adjugate instead of the inverse matrix.
@@ -93,9 +93,9 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   // Moves the start away from the surface by more than the steps between neighboring cells of a
   // slope, so that these cells do not occlude it.
   s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
-  // In a narrow place, the start may be in an occupied cell. Then it is replaced by the point on
-  // the ray 1.5 cells before the hit. That point is free unless the camera is in an occupied cell
-  // or closer than 1.5 cells to the hit.
+  // In a narrow place, the start may be in an occupied cell. Then the start is replaced by the
+  // point on the ray 1.5 cells before the hit. That point is free unless the camera is in an
+  // occupied cell or closer than 1.5 cells to the hit.
   if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))
     s.start = ray.at(s.t - 1.5 * s.size);
   return true;

@@ -13,7 +13,8 @@ namespace voxdag::query {
 // Maximum distance, in voxels, at which a surface is seen.
 inline constexpr double kFarthest = 1e30;
 // Returns the cone of a ray through a pixel that is `pixel_spread` wide at distance 1. A ray ends
-// at an occupied cell that is at most three quarters of a pixel wide. It visits no finer cells.
+// at an occupied cell that is at most three quarters of a pixel wide. The ray visits no finer
+// cells.
 inline Cone visible_cone(double pixel_spread) { return {0, 0.75 * pixel_spread}; }
 
 struct SurfaceHit {

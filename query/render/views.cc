@@ -24,9 +24,9 @@ const NamedDirection kDirections[] = {
     {"left", {{-1, 0, 0}}},     {"right", {{1, 0, 0}}}, {"top", {{0, 1, 0}}},
 };
 
-// Returns the width, in voxels, of the rays that choose a view: 1/4096 of a large grid's edge.
-// Thinner rays would visit finer cells, which give the same view, but are scattered over the file
-// and may have to be read from disk.
+// Returns the width, in voxels, of the rays that are cast to choose a view: 1/4096 of the grid's
+// edge, or 0 if the grid has at most 4096 voxels per edge. Thinner rays would visit finer cells.
+// These give the same view, but are scattered over the file and may have to be read from disk.
 double finest_width(const DagView& dag) {
   constexpr int64_t kCells = 4096;
   return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;
@@ -35,7 +35,7 @@ double finest_width(const DagView& dag) {
 // Limits of the work for choosing a view. A step is a node or brick that is read. The search is
 // inside_view(), which rates views in two passes: roughly, then with more rays. Without limits, a
 // scene of dust, whose rays pass through thousands of cells, or a damaged scene could keep a
-// service busy for minutes. Sponza at 4096^3 takes 0.4 million steps for the enclosure, and 3.6 and
+// service busy for minutes. Sponza at 4096^3 takes 0.4 million steps for enclosure(), and 3.6 and
 // 1.4 million for the two passes of the search.
 constexpr uint64_t kMaxEnclosureSteps = uint64_t{1} << 22;
 constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // for each of the two passes
@@ -63,7 +63,7 @@ class LimitedRays {
 // Returns a measure of how enclosed the scene is. Casts rays from up to 1000 places on the surface
 // to 26 directions, and takes the longest free distance at each place. A place from which a ray
 // leaves the scene counts as 0. The result is the mean of these distances, as a share of the
-// scene's diagonal. It is near 0 for an object or for caves, and larger for interiors.
+// scene's diagonal. The result is near 0 for an object or for caves, and larger for interiors.
 double enclosure(const DagView& dag, const OccupiedCells& cells, const Box& box,
                  const CancelToken& cancel) {
   constexpr size_t kPlaces = 1000;

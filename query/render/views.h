@@ -48,15 +48,16 @@ const std::vector<std::string>& view_names();
 // the field of view is 62 degrees for "inside" and 32 degrees for the other views.
 //
 // "inside" and "auto" cast rays for up to half a second. If the scene is dust (small separate
-// particles, between which rays pass through thousands of cells), they take one to two seconds. The
-// rays read a limited number of nodes. At this limit, the result is the best view so far, or "iso".
+// particles, between which rays pass through thousands of cells), these two views take one to two
+// seconds. The rays read a limited number of nodes. At this limit, the result is the best view so
+// far, or "iso".
 //
 // Throws Error{kInvalidInput} for an unknown name, and the error of `cancel`.
 Placement named_view(const std::string& name, const DagView& dag, double aspect,
                      std::optional<double> fov_degrees, const CancelToken& cancel = {});
 
-// Like named_view(), for several views of the same DAG. Data that the views share is computed only
-// once. The DAG and the token must outlive this object.
+// Like named_view(), but for several views of the same DAG: data that several views need is
+// computed only for the first of them. The DAG and the token must outlive this object.
 class NamedViews {
  public:
   NamedViews(const DagView& dag, const CancelToken& cancel) : dag_(dag), cancel_(cancel) {}

@@ -18,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr uint64_t kMinChunkEdge = 4;
 
-// A chunk: its position in chunks of the same level, and the selected cells in it.
+// A chunk. `place` is its low corner, in units of a chunk's edge. `selection` selects its cells.
 struct Chunk {
   Position place;
   Selection selection;

@@ -1,9 +1,9 @@
-// Divides a grid, and also coarser levels of it, into cubes of equal size, the chunks, and exports
-// each chunk to its own file. Game engines load such chunks by distance. A manifest lists all
-// chunks.
+// Divides a grid, and optionally coarser levels of the grid, into cubes of equally many cells, the
+// chunks, and exports each chunk to its own file. Game engines load such chunks when the viewer
+// comes close. A manifest lists all chunks.
 //
 //     FOLDER/manifest.json
-//     FOLDER/L10/3_0_7.vox     the chunk at (3, 0, 7) of level 10, in chunks
+//     FOLDER/L10/3_0_7.vox     level 10; the low corner is at (3, 0, 7) times a chunk's edge
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@
 namespace voxdag::query {
 
 struct ChunksRequest {
-  // `selection` is on the finest level to export. `output` is the folder.
+  // `request.selection` is on the finest level to export. `request.output` is the folder.
   ExportRequest request;
-  uint64_t edge = 256;  // cells per edge of a chunk, on every level; a power of two from 4 on
+  uint64_t edge = 256;  // cells per edge of a chunk, on every level; a power of two, at least 4
   uint64_t levels = 1;  // exported levels: the selected one and the next coarser ones
 };
 
 struct ChunksReport {
   std::string manifest;  // path of the manifest
-  uint64_t chunks = 0;   // files of chunks; chunks without voxels have none
+  uint64_t chunks = 0;   // number of chunk files; chunks without voxels have no file
   uint64_t voxels = 0;   // sum over all chunks of all levels
   uint64_t bytes = 0;    // total size of all chunk files
 };

@@ -17,9 +17,8 @@ using Lab = std::array<uint32_t, 3>;
 // fit in 64 bits.
 constexpr double kLabScale = 4096, kLabShift = 1;
 
-// Returns the cube root, by Newton's method with a start value above the root. The fixed number of
-// steps is enough for all colors of 8 bits: the cube roots that they need, except 0, are at least
-// 1/40.
+// Returns the cube root, by Newton's method with a start value above the root. The number of steps
+// is fixed. It is enough for oklab_of(), where the roots for 8-bit colors are 0 or at least 1/40.
 double cube_root(double x) {
   double root = 1;
   for (int i = 0; i < 24; ++i) root = (2 * root + x / (root * root)) / 3;

@@ -9,7 +9,7 @@
 
 namespace voxdag::query {
 
-// Returns a table: element i is the linear value of the sRGB byte i, where 65535 means 1.
+// Returns a table. Element i is the linear light of the sRGB byte i; 65535 means full intensity.
 inline const std::array<uint16_t, 256>& linear_of_srgb() {
   static const std::array<uint16_t, 256> table = [] {
     std::array<uint16_t, 256> linear{};

@@ -11,8 +11,8 @@ constexpr const char* kMeshMemory =
     "two layers of the mesh (a smaller --region or a coarser --level needs less)";
 
 // For one axis: `low` has the bits of a brick's mask at which bit 0 of the coordinate on the axis
-// is set, and `high` the same for bit 1. If two cells' coordinates differ only in bit 0, their bits
-// in the mask are `low_step` apart; for bit 1, `high_step`.
+// is set, and `high` has the bits at which bit 1 is set. Two cells that differ only in bit 0 of
+// this coordinate have mask bits that are `low_step` apart; for bit 1, the distance is `high_step`.
 struct AxisBits {
   uint64_t low, high;
   int low_step, high_step;
@@ -27,14 +27,15 @@ uint64_t next_within(uint64_t mask, const AxisBits& axis) {
   return (mask & ~axis.low) << axis.low_step | (mask & axis.low & ~axis.high)
                                                    << (axis.high_step - axis.low_step);
 }
-// Returns the mask, in the next brick on the axis, of the cells there that are next to the cells of
-// `mask`.
+// Returns the cells of the next brick on the axis that are next to the cells of `mask`, as a mask
+// of that brick.
 uint64_t next_beyond(uint64_t mask, const AxisBits& axis) {
   return (mask & axis.low & axis.high) >> (axis.low_step + axis.high_step);
 }
 
-// Returns a mask of the corner points of a brick's cells `mask`: the points in the PointBrick at
-// the offset (dx, dy, dz) from the brick. `beyond` is 4dx + 2dy + dz, where each is 0 or 1.
+// A brick's cells have corner points in up to eight PointBricks. Returns the mask of the points in
+// the PointBrick at the offset (dx, dy, dz) from the brick. `mask` has the brick's cells. `beyond`
+// is 4dx + 2dy + dz, where each is 0 or 1.
 uint64_t points_of_brick(uint64_t mask, int beyond) {
   for (int axis = 0; axis < 3; ++axis)
     mask = beyond >> (2 - axis) & 1 ? next_beyond(mask, kAxisBits[axis])
@@ -81,8 +82,8 @@ HexSweep::Slab<HexSweep::HexBrick> HexSweep::read_slab(int64_t slab) const {
 }
 
 // Calls visit(place, mask) for each PointBrick of the current slab, by increasing place. A
-// PointBrick can have corners of cells in up to eight bricks, so this merges eight sequences of
-// bricks.
+// PointBrick can have corners of cells in up to eight bricks, so this function merges eight
+// sequences of bricks.
 template <class Visit>
 void HexSweep::merge_points(const Visit& visit) const {
   struct Sequence {

@@ -5,8 +5,8 @@
 // slab after the other. It stores the bricks and the points of two slabs, never the complete mesh.
 // Points are grouped like cells: a PointBrick has the points at the low corners of the 4x4x4 cells
 // of a brick. So points on the upper sides of a brick belong to its neighbors' PointBricks. The
-// points of a slab get consecutive numbers in the order (y, z) of their PointBricks. They depend on
-// the bricks of this slab and of the slab before.
+// points of a slab get consecutive numbers in the order (y, z) of their PointBricks. The points of
+// a slab depend only on the bricks of this slab and of the previous slab.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct HexSlabs {
 
   uint64_t voxels = 0;
   int64_t first = 0;                   // the first slab with bricks
-  std::vector<uint32_t> brick_counts;  // of the slabs from `first` on; the last one has bricks
+  std::vector<uint32_t> brick_counts;  // bricks per slab from `first` on; the last is not 0
 };
 
 // Visits the mesh slab by slab. After each call of next() that returns true, for_each_point()
@@ -73,7 +73,7 @@ class HexSweep {
   };
   template <class T>
   struct Slab {
-    PageBuffer<T> items;  // by place
+    PageBuffer<T> items;  // in the order of their places
     uint64_t count = 0;
   };
   using Points = std::array<uint64_t, 8>;
@@ -89,9 +89,9 @@ class HexSweep {
   template <class Visit>
   void merge_points(const Visit& visit) const;
   void number_points();
-  // Returns the PointBricks that can have corners of the cells of a brick of the slab before. Their
-  // offset from the brick is (dx, dy, dz), and their index 4dx + 2dy + dz. An element is null if
-  // the PointBrick has no points.
+  // Returns the PointBricks that can contain corners of a brick's cells. The brick is at `place` in
+  // the previous slab. The element 4dx + 2dy + dz is the PointBrick at the offset (dx, dy, dz) from
+  // the brick; it is null if this PointBrick has no points.
   std::array<const PointBrick*, 8> point_bricks_around(uint64_t place) const;
   static Points points_of(const std::array<const PointBrick*, 8>& around, int bit);
 

@@ -12,11 +12,11 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxInpLabel = 999'999'999;  // of Abaqus
+constexpr uint64_t kMaxInpLabel = 999'999'999;  // the maximum of Abaqus
 constexpr int kInpDigits = 12;
 constexpr const char* kInpSet = "VOXELS";
-// Minimum sizes in bytes of the lines of a node and of an element: numbers of one digit, a comma
-// after each, and a line end.
+// Minimum sizes in bytes of the lines of a node and of an element. A line has four or nine numbers
+// of at least one digit, and a comma or a line end after each number.
 constexpr uint64_t kMinNodeBytes = 8;
 constexpr uint64_t kMinElementBytes = 18;
 

@@ -15,7 +15,7 @@
 namespace voxdag::query {
 namespace {
 
-// Many readers count points and cells in 32-bit integers.
+// Many readers count points and cells in signed 32-bit integers.
 constexpr uint64_t kMaxVtuNumbers = (uint64_t{1} << 31) - 1;
 constexpr uint8_t kVtkHexahedron = 12;
 
@@ -34,7 +34,7 @@ const char* vtk_type(NumberType number) {
 // An array in the appended data, where its size in bytes precedes its numbers.
 struct VtuArray {
   uint64_t offset = 0;  // from the beginning of the appended data
-  uint64_t bytes = 0;   // of the numbers
+  uint64_t bytes = 0;   // size of the numbers
   uint64_t written = 0;
 };
 
@@ -65,7 +65,7 @@ struct VtuLayout {
 
   std::string xml;
   std::vector<VtuArray> arrays;
-  uint64_t data_bytes = 0;  // of the appended data
+  uint64_t data_bytes = 0;  // size of the appended data
 
  private:
   void add(const char* type, const char* name, uint32_t components, uint64_t bytes) {

@@ -1,6 +1,6 @@
-// This file is compiled for AVX2. walk_packet_avx2() returns walk() only if the CPU has all
-// instructions that the compiler may use in this file. No other function of this file may be called
-// without this check.
+// This file is compiled for AVX2. No function of this file except walk_packet_avx2() may be called
+// on a CPU that lacks the instructions that the compiler may use here. So walk_packet_avx2() checks
+// the CPU first, and returns a null pointer instead of walk() if an instruction is missing.
 #include <immintrin.h>
 
 #include "query/rays/packet_walk.h"
