@@ -47,7 +47,7 @@ def test_shades_show_normals_levels_and_sharing(path):
         assert np.array_equal(picture[:, :, 3], pictures[0][:, :, 3])
         assert not any(np.array_equal(picture, other) for other in pictures[:i])
     up = pictures[3][pictures[3][:, :, 3] == 255][:, 1]
-    assert np.median(up) > 200  # seen from above, most normals point up
+    assert np.median(up) > 170  # seen from above, most normals point up
 
 
 def test_a_camera_is_placed_in_scene_units(path):
