@@ -5,8 +5,8 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxStepS = 3600;              // maximum lead of the clock over the elapsed time
-constexpr double kMaxPauseS = kSecondsPerDay;   // maximum time between two runs of the service
+constexpr double kMaxStepS = 3600;              // a larger lead over the elapsed time is a jump
+constexpr double kMaxPauseS = kSecondsPerDay;   // a longer pause between two runs is a jump
 constexpr double kUncertainS = kSecondsPerDay;  // time after a jump in which nothing is deleted
 
 }  // namespace

@@ -21,9 +21,9 @@ class ClockGuard {
   bool has_jumped(double clock_s, double now_s);
   // True if the clock jumped within the last day.
   bool is_uncertain(double now_s) const { return now_s < uncertain_until_s_; }
-  // Returns the Unix time before which data is older than `days`; 0 while the clock is uncertain.
-  // Calls has_jumped(). If the clock has jumped, logs that the service deletes no old data for a
-  // day; `what` names the data in this log line.
+  // Returns the Unix time `days` days ago; 0 while the clock is uncertain, so that no data is
+  // older. Calls has_jumped(). If the clock has jumped, logs that the service deletes no old data
+  // for a day; `what` names the data in this log line.
   double oldest_s(double days, const char* what, const Log& log);
 
  private:

@@ -9,8 +9,7 @@
 
 namespace voxdag::server {
 
-// Returns the value on one line. Replaces bytes that are not UTF-8, because texts may come from
-// scenes.
+// Returns the value on one line. Replaces invalid UTF-8, which strings from scenes can contain.
 template <class Json>
 std::string json_text(const Json& value) {
   return value.dump(-1, ' ', false, Json::error_handler_t::replace);

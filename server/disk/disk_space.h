@@ -26,9 +26,10 @@ class DiskSpace {
   // The disk space of one upload, reserved during the lifetime of this object. Used by one thread.
   class Reservation {
    public:
-    // `announced`: the expected number of bytes, 0 if unknown. Throws Error{kNoSpace} unless this
-    // number of bytes is free in addition to the space that is kept free or already reserved.
-    // Reserves only the first of these bytes, so other uploads may use the rest before it arrives.
+    // `announced`: the expected size of the upload in bytes, 0 if unknown. Throws Error{kNoSpace}
+    // unless this much space is free in addition to the space that is kept free or already
+    // reserved. Reserves at most 8 MiB of this space. Other uploads may take the rest before this
+    // upload reserves it.
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;

@@ -23,7 +23,8 @@ struct StoreFormat {
 // version if format.upgrade is not null. Throws Error{kUnsupportedVersion} for other versions, and
 // Error{kInvalidInput} if the database belongs to another program, or is new and `may_create` is
 // false. Unless the operator gave --adopt, callers set `may_create` to false if the data folder has
-// files of this kind: then a database that listed these files was probably lost.
+// files that this database should list: then an earlier database, which listed these files, was
+// probably lost.
 SqlDatabase open_store(const std::string& path, const StoreFormat& format, bool may_create);
 
 }  // namespace voxdag::server

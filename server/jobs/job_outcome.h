@@ -12,7 +12,8 @@ namespace voxdag::server {
 // attempt, up to limits.max_backoff_s.
 double pause_s(const JobLimits& limits, unsigned attempts);
 
-// Changes the job, which may have been suspended, resumed or canceled since it started:
+// Sets the job's new state. A client may have suspended, resumed or canceled the job since its
+// start:
 //   outcome of the process   new state
 //   a result                 succeeded; canceled if a client requested that
 //   stopped on request       canceled or suspended, as requested; queued if the service is stopping

@@ -55,7 +55,7 @@ struct Job {
   std::vector<std::string> scenes;  // uploads that the job needs until it ends
   std::string posted_by;            // name of the token of the client that submitted the job
   int priority = 0;
-  bool front = false;  // was running before: queued before other jobs of its priority
+  bool front = false;  // was running before; so it comes first among the jobs of its priority
   unsigned attempts = 0;
   unsigned interruptions = 0;  // number of consecutive runs that ended because the service ended
   double created_s = 0, started_s = 0, finished_s = 0, not_before_s = 0;

@@ -12,9 +12,9 @@ namespace voxdag::server {
 // title `title` and shows the package in its own folder.
 std::vector<query::ViewerFile> viewer_site(const std::string& title);
 
-// Returns a page that contains the module of the viewer, for `publish --single-file`. It reads the
-// files of the package from elements <script type="text/plain" data-file=NAME> in the page, which
-// the caller must insert. These elements contain the bytes of the files in base64.
+// Returns a page that contains the module of the viewer, for `publish --single-file`. The module
+// reads the files of the package from elements <script type="text/plain" data-file=NAME> in the
+// page, which the caller must insert. These elements contain the bytes of the files in base64.
 std::string page_with_module(const std::string& title);
 
 }  // namespace voxdag::server

@@ -12,7 +12,7 @@
 
 namespace voxdag::server {
 
-// Number of node levels in a tile; docs/api.md has the reason.
+// Number of node levels in a tile; docs/view.md has the reason.
 inline constexpr uint32_t kTileLevels = 3;
 // Maximum number of tiles per request.
 inline constexpr size_t kMaxTilesOfBatch = 64;
@@ -34,9 +34,8 @@ class TileSource {
   virtual const std::string& digest() const = 0;
   // Returns the data that a viewer needs to begin, as JSON (docs/api.md).
   virtual const std::string& manifest(const CancelToken& cancel) const = 0;
-  // Throws Error{kIo} if a part of the file could not be read at any time since the file was
-  // opened, because the file was truncated or its disk failed. Results that were computed after
-  // such a failure are wrong.
+  // Throws Error{kIo} if a read of the file has failed since the file was opened, because the file
+  // was truncated or its disk failed. Results that were computed after such a failure are wrong.
   virtual void expect_readable() const {}
   // True if the file was changed after it was opened. The bytes read from it may then mix both
   // versions.

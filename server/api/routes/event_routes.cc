@@ -75,8 +75,8 @@ std::optional<std::string> EventFeed::next() {
 }
 
 void EventFeed::wait() {
-  // Progress events have a minimum interval. If it has delayed a progress event, this wait ends as
-  // soon as the interval has passed.
+  // Progress events have a minimum interval. If a progress event is delayed until the end of this
+  // interval, the wait also ends then.
   const double left_s = last_progress_s_ + kProgressIntervalS - wall_seconds();
   context_.queue.wait_for_change(seen_version_, left_s > 0 ? left_s : kMaxWaitS);
 }

@@ -193,7 +193,7 @@ Response dry_run(Context& context, Call& call, const JobRequest& request) {
 
 JobRequest read_job_request(Context& context, Call& call) {
   const std::string body = read_json_body(call.request, context.config.transfers.max_body_bytes);
-  const auto permit = context.answers.wait();  // parsed JSON needs a multiple of its text
+  const auto permit = context.answers.wait();  // parsed JSON takes several times its text's memory
   JobRequest request = parse_job_request(body);
   if (request.text.size() > kMaxRequestBytes)
     throw bad_request("scene, resolution and options have " + std::to_string(request.text.size()) +

@@ -30,8 +30,8 @@ Job finished_job(Context& context, Call& call) {
   return job;
 }
 
-// Returns the file name of a download, NAME-RESOLUTION.vdag. NAME is the job's name, or its first
-// scene's if the job has none, reduced to characters that are safe in headers and shells.
+// Returns the file name of a download, NAME-RESOLUTION.vdag. NAME is the name of the job, or of its
+// first scene if the job has no name, reduced to characters that are safe in headers and shells.
 std::string file_name(const Job& job) {
   const auto request = nlohmann::json::parse(job.request);
   std::string base = job.name;

@@ -30,7 +30,8 @@ bool is_loopback(const std::string& address) {
 
 std::string client_of(const std::string& address) {
   in6_addr parsed{};
-  // In a link-local address, the name of the network interface follows a percent sign.
+  // Removes the percent sign and the name of the network interface that end a link-local address,
+  // because inet_pton() does not accept them.
   if (inet_pton(AF_INET6, address.substr(0, address.find('%')).c_str(), &parsed) != 1)
     return address;
   char text[INET6_ADDRSTRLEN];

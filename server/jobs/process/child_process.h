@@ -31,7 +31,7 @@ class ChildProcess {
   void read_lines(const std::function<void(std::string_view line)>& use,
                   const std::function<bool()>& tick);
   // Sends SIGTERM. A build then stops at its next checkpoint. A child that has not started its
-  // program yet ends. May be called from any thread.
+  // program yet ends immediately. May be called from any thread.
   void request_stop();
   // Sends SIGKILL. May be called from any thread.
   void kill();

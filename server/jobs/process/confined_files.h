@@ -1,6 +1,6 @@
-// A file system that opens only the given files for reading. Without it, an uploaded scene could
-// read any file of the machine by naming it as a buffer: directly, with "..", or through a symbolic
-// link. Calls that do not open a file for reading are forwarded.
+// A file system that opens only the given files for reading. Without this class, an uploaded scene
+// could read any file of the machine by naming it as a buffer: directly, with "..", or through a
+// symbolic link. Calls that do not open a file for reading are forwarded.
 #pragma once
 
 #include <memory>

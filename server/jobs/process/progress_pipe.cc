@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kAdvanceIntervalS = 0.25;
 constexpr double kSubvolumesIntervalS = 1;
-// Maximum share of one core for writing subvolumes.json.
+// Maximum share of one core's time that is used to write subvolumes.json.
 constexpr double kMaxSubvolumesShare = 0.01;
 
 void write_all(int file, const std::string& text) {

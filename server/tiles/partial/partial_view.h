@@ -48,9 +48,9 @@ class ReadLimiter {
   double idle_until_s_ = 0;  // in wall_seconds(): end of the pause that limits the CPU share
 };
 
-// The DAG of the built subvolumes. It grows under one digest. Nodes that only earlier roots use
-// remain, so it has too many words at some time. Then a new DAG is built, with a new digest. Used
-// by one thread.
+// The DAG of the built subvolumes. It grows and keeps its digest until it has too many words,
+// because nodes that only earlier roots use remain in it. Then a new DAG is built, with a new
+// digest. Used by one thread.
 class GrowingDag {
  public:
   GrowingDag(std::string job, uint64_t max_words) : job_(std::move(job)), max_words_(max_words) {}

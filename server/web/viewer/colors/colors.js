@@ -69,7 +69,7 @@ export class Colors {
   }
 
   // Adds a page to `wanted`. Its priority is the number of pixels that need it. More pixels need a
-  // coarse page, so coarse pages come first. If memory is short, every part of the picture still
+  // coarse page, so coarse pages come first. So even if memory is short, every part of the picture
   // has colors.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);

@@ -118,7 +118,8 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// Returns the start of a ray to the light, so far above the cells that their steps do not block it.
+// Returns the start of a ray to the light. It is far enough above the surface that the steps
+// between the cells of a smooth surface do not block the ray.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
@@ -455,7 +456,8 @@ void main() {
 // Writes one texel per block of u_block x u_block pixels. Word 1: Hit.missing of the widest cell
 // whose tile is missing, or else of a shadow's ray. Word 2: the width of this cell in pixels, and
 // the brightness of the pixel u_sample, which differs between frames. Word 3: the slot of a tile
-// that this pixel uses, and half the number of its ray's steps. Word 4: the t of this ray's hit.
+// that this pixel uses, and half the number of its ray's steps. Word 4: the distance t of this
+// ray's hit.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;

@@ -67,7 +67,7 @@ uniform int u_wire_scale;  // scale of the cubes whose edges are drawn; -1: none
 uniform float u_wire_width;  // half the width of a line at distance 1
 uniform vec2 u_wire_fade;     // distance at which lines begin to fade, and 1 / length of the fade
 float wire = 0.0;  // opacity of the lines at the pixel, 0 to 1
-const float kFront = 0.4;                   // factor of opacity for each further cube behind a line
+const float kFront = 0.4;                   // a line's opacity factor per cube behind it
 const float kHidden = 4.0, kClear = 20.0;  // cube edges in pixels: no lines below, full lines above
 #endif
 #ifdef CELL

@@ -31,9 +31,9 @@ export function pauseAfter(failures) {
 // Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. Derived classes have
 // these functions:
 //
-//     async fetchAll(batch, options) resolves to the answers, in the order of the requests. An
-//     answer
-//                                    may be an Error if only this item is not available
+//     async fetchAll(batch, options)
+//                                    resolves to the answers, in the order of the requests; an
+//                                    answer is an Error if only its item is not available
 //     keep(request, answer, nowMs)   false if there is no space; throws if the answer is damaged
 //     nameOf(request)                the item's name for messages
 //
