@@ -55,7 +55,7 @@ void take_allocation(RunOptions& run) {
     run.memory_bytes = batch_budget(given.memory_bytes);
   if (run.threads == 0) run.threads = given.cpus;
   // An earlier attempt at this job may still be ending on another node. Until it ends, it holds the
-  // lock of the build, so wait longer than other commands do.
+  // lock of the build. So this process waits longer for the lock than other commands do.
   run.lock_wait_s = 300;
   run.restart = false;
 }

@@ -15,8 +15,8 @@ std::vector<uint64_t> parse_resolutions(const std::string& text);
 // Returns the documentation of the option.
 std::string resolutions_help();
 
-// Returns one build for each resolution, in the same order. If there are several, the names of each
-// build's files and work folder have its resolution: OUT.vdag becomes OUT-1024.vdag.
+// Returns one build for each resolution, in the same order. If there are several, the names of a
+// build's files and work folder contain the build's resolution: OUT.vdag becomes OUT-1024.vdag.
 std::vector<BuildSpec> builds_of(const BuildSpec& spec, const std::vector<uint64_t>& resolutions);
 
 }  // namespace voxdag::cli

@@ -21,8 +21,8 @@ bool is_included(const Feature& feature) { return feature.state == std::string_v
 // Returns the commit, or "unknown" for sources that are not in a Git repository.
 std::string commit() { return *kCommit ? kCommit : "unknown"; }
 
-// Returns the text that follows a feature that this build does not include: the packages to install
-// if they were missing, otherwise the feature's state.
+// Returns the text to print after a feature that this build does not include: the packages to
+// install if packages were missing, otherwise the feature's state.
 std::string advice(const Feature& feature) {
   const bool is_missing = feature.state == std::string_view("missing");
   return is_missing ? std::string("install ") + feature.packages + ", and build voxdag again"

@@ -90,7 +90,7 @@ struct BuildOptions {
   std::string work_folder;
   bool keep_work = false;    // keep the work folder after success
   bool restart = false;      // discard the job in the work folder and start over
-  bool force = false;        // build although the estimate predicts a lack of memory or disk space
+  bool force = false;        // build even if the estimated disk space exceeds the free space
   bool strict = false;       // throw Error{kInvalidInput} for a warning about the scene
   bool allow_empty = false;  // write a file without voxels instead of refusing the scene
   std::string cache_folder;  // folder for subvolumes shared between builds; "": no cache

@@ -8,8 +8,8 @@ namespace {
 
 constexpr size_t kMaxLineBytes = 4096;
 // For each chunk with content, this number of bytes of the chunk's size line is not counted against
-// kMaxExtraBytes. It is enough for the longest size in hex. These bytes need no limit, because at
-// least one byte of content follows the line. All other bytes outside the content count:
+// kMaxExtraBytes. This number is enough for the longest size in hex. These bytes need no limit,
+// because at least one byte of content follows the line. All other bytes outside the content count:
 // extensions, the line of the last chunk, and trailers with their line ends.
 constexpr size_t kMaxSizeDigits = 16;
 constexpr size_t kMaxExtraBytes = 16384;

@@ -143,8 +143,8 @@ class Dispatcher {
   bool stops_ = false;
   bool recovered_ = false;  // if false, recover() must run before the next job starts
 
-  // Guards only live_. It is separate from mutex_, so that requests for progress do not wait for
-  // changes of the queue.
+  // Guards only live_. This mutex is separate from mutex_, so that requests for progress do not
+  // wait for changes of the queue.
   mutable std::mutex live_mutex_;
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // keyed by job
 

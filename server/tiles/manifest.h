@@ -34,8 +34,8 @@ nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& vie
                                  const query::DagView& dag, const GridPlace& place,
                                  double aspect = kWideAspect);
 
-// Returns the manifest of a file. It takes up to a second to compute the cameras, or longer if the
-// file must first be read from the disk.
+// Returns the manifest of a file. Computing its cameras takes up to a second, or longer if the file
+// must first be read from the disk.
 nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const query::DagView& dag,
                                      const std::string& digest, const CancelToken& cancel);
 

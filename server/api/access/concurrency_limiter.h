@@ -28,8 +28,8 @@ class ConcurrencyLimiter {
     return std::shared_ptr<void>(state_.get(),
                                  [state = state_, client](void*) { state->release(client); });
   }
-  // Waits for a permit. Ignores the limit per client. Use it only for operations that take
-  // milliseconds, because other callers also wait.
+  // Waits for a permit. Ignores the limit per client. Call it only for operations that take
+  // milliseconds, because other callers wait for the permit.
   std::shared_ptr<void> wait() {
     std::unique_lock lock(state_->mutex);
     state_->released.wait(lock, [&] { return state_->in_use < max_; });

@@ -5,7 +5,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kDepthS = 2;  // capacity of a bucket, in seconds of requests
+constexpr double kDepthS = 2;  // a bucket holds the tokens for this many seconds
 // If more buckets than this number exist, full buckets are dropped. This changes no limit, because
 // a client without a bucket gets a new one, which is also full.
 constexpr size_t kMaxBuckets = 10000;

@@ -26,7 +26,7 @@ class Metrics {
   void count_request(int status, double wall_s);
   void count_uploaded(uint64_t bytes) { uploaded_bytes_ += bytes; }
   void count_downloaded(uint64_t bytes) { downloaded_bytes_ += bytes; }
-  // Counts the end of a job's run by the job's new state.
+  // Counts a run of a job that has ended, by the job's new state.
   void count_run(const Job& job);
 
   // Returns all metrics as text: the counters, the number of jobs by state (`jobs`), and `samples`.

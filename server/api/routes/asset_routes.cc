@@ -34,8 +34,8 @@ Response get_asset(Call& call, const Asset& asset, const std::string& ancestors 
   return response;
 }
 
-// The OpenAPI document. The first request for it creates it, because all routes are known only
-// then.
+// The OpenAPI document. The first request for the document creates it: at that time, all routes
+// have been added.
 struct Document {
   std::once_flag is_created;
   Asset asset;

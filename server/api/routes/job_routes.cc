@@ -24,8 +24,8 @@ constexpr size_t kMaxKeyChars = 255;
 constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends after the job with which it
                                              // exceeds this size
 constexpr size_t kJobsPerRead = 16;
-// Maximum size of a stored request. The service keeps it as long as the job, and sends it with
-// every answer about the job.
+// Maximum size of a stored request. The service keeps the request as long as the job, and includes
+// it in every answer about the job.
 constexpr size_t kMaxRequestBytes = 32 << 10;
 constexpr const char* kJobs = "/api/v1/jobs";
 constexpr const char* kJob = "/api/v1/jobs/{id}";
@@ -257,7 +257,7 @@ std::string add_page(Context& context, JobFilter filter, std::string& body) {
   size_t missing = filter.limit;
   bool more = true;
   for (const char* separator = ""; more && missing > 0 && body.size() < kMaxPageBytes;) {
-    filter.limit = std::min(missing, kJobsPerRead) + 1;  // one more: shows if others follow
+    filter.limit = std::min(missing, kJobsPerRead) + 1;  // one more, to find out if others follow
     std::vector<Job> jobs = context.queue.list(filter);
     more = jobs.size() == filter.limit;
     if (more) jobs.pop_back();

@@ -13,8 +13,8 @@ namespace {
 
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLingerS = 1;
-// Maximum bytes that linger() discards: more than the kernel and a proxy buffer. A proxy reads the
-// answer only after it has sent the bytes that it has.
+// Maximum bytes that linger() discards. This is more than the buffers of the kernel and of a proxy
+// hold, because a proxy reads the answer only after it has sent all bytes in its buffers.
 constexpr size_t kLingerBytes = 16 << 20;
 constexpr double kSteadyRates = 8;  // the steady rate as a multiple of the minimum rate
 

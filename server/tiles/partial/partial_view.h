@@ -49,7 +49,7 @@ class ReadLimiter {
 };
 
 // The DAG of the built subvolumes. It grows and keeps its digest until it has too many words,
-// because nodes that only earlier roots use remain in it. Then a new DAG is built, with a new
+// because nodes that only earlier roots use remain in the DAG. Then a new DAG is built, with a new
 // digest. Used by one thread.
 class GrowingDag {
  public:

@@ -11,7 +11,7 @@ const kTurnRate = 1.2;       // radians per second, while an arrow key is held
 const kZoomRate = 1.6;       // per second, by + and -
 const kFlyRate = 0.8;        // per second, in multiples of the distance to the visible surface
 const kFast = 4;             // factor of the speed while Shift is held
-const kFirstStepS = 1 / 20;  // a key press immediately moves the camera by this time
+const kFirstStepS = 1 / 20;  // motion time that a key press adds immediately
 
 export class Motion {
   // seenDistance() is in voxels.

@@ -118,11 +118,11 @@ uint color_of_cell(ivec3 cell, int scale, bool is_final) {
 }
 `;
 
-// Writes one texel per block of u_block x u_block pixels. It describes the page of one pixel of the
-// block: of the first pixel whose page is missing, or else of the pixel u_sample. The four words
-// are the page's x, with the level in the bits from 20; y; z; and a number. The number is 0 if the
-// pixel shows no surface, and otherwise 1 plus the number of the block's pixels whose page is
-// missing.
+// Writes one texel per block of u_block x u_block pixels. The texel describes the page of one pixel
+// of the block: of the first pixel whose page is missing, or else of the pixel u_sample. The four
+// words are the page's x, with the level in the bits from 20; y; z; and a number. The number is 0
+// if the pixel shows no surface, and otherwise 1 plus the number of the block's pixels whose page
+// is missing.
 export const kColorFeedback = `#version 300 es
 ${kPrecision}${kCameraSource}${kColorState}
 uniform usampler2D u_hits, u_colors;

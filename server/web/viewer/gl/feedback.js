@@ -1,6 +1,6 @@
-// Decodes the feedback. It is a small picture that is drawn with each sample of a picture, and it
-// contains the missing tiles, the used tiles, and statistics. A *reading* is one feedback, copied
-// from the GPU.
+// Decodes the feedback. The feedback is a small picture that is drawn with each sample of a
+// picture. It contains the missing tiles, the used tiles, and statistics. A *reading* is one
+// feedback, copied from the GPU.
 
 const kMaxSamples = 4096;  // texels from which the statistics are computed
 const kHalf = new DataView(new ArrayBuffer(4));

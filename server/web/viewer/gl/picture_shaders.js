@@ -118,8 +118,8 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// Returns the start of a ray to the light. It is far enough above the surface that the steps
-// between the cells of a smooth surface do not block the ray.
+// Returns the start of a ray to the light. The start is so far above a smooth surface that the
+// steps between the surface's cells do not block the ray.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }

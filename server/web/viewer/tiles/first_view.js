@@ -15,7 +15,8 @@ export class FirstView {
   constructor({levels}, view, {width, height}, finest) {
     Object.assign(this, {levels, view, finest});
     this.pixel = view.pixel(height);
-    // Slopes of the sides of the picture.
+    // Slopes of the sides of the picture: the tangents of half the horizontal and vertical field of
+    // view.
     this.slopes = [view.tangent * width / height, view.tangent];
     this.known = new Map();   // key -> words of a tile
     this.places = new Map();  // tile key -> low corners of the places that need the tile
