@@ -33,7 +33,8 @@ struct ClientOptions {
 };
 
 // The constructor throws Error{kInvalidInput} for a malformed URL. Requests throw Error{kIo} if the
-// server cannot be reached or the connection breaks. An answer with an error status is returned.
+// server cannot be reached or the connection breaks. An answer with an error status is returned,
+// not thrown.
 class HttpClient {
  public:
   explicit HttpClient(const ClientOptions& options);

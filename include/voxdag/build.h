@@ -67,7 +67,8 @@ struct BuildOptions {
   // without them, with a warning.
   std::vector<std::string> ignore_extension;
   bool skip_invalid = false;  // drop and count invalid triangles instead of refusing the scene
-  // Sets only voxels in which a triangle crosses a row through the voxel's center (docs/solid.md).
+  // Sets only voxels in which a triangle crosses a line along an axis through the voxel's center
+  // (docs/solid.md).
   bool thin = false;
   CutoutRule cutouts = CutoutRule::kDefault;
   uint32_t hash_bits = 64;  // bits of the node hash, 4 to 64
@@ -150,8 +151,8 @@ struct BuildResult {
   std::string json;  // the complete report, as `voxdag build --json` prints it
 };
 
-// Runs the build, or resumes the build in its work folder. Also writes the report to output +
-// ".report.json".
+// Runs the build, or resumes the build in its work folder. Returns the result, and also writes the
+// report to output + ".report.json".
 BuildResult build(const BuildOptions& options, const BuildHooks& hooks = {});
 
 // An estimated quantity, and the range in which it is expected.
@@ -172,7 +173,7 @@ struct BuildPlan {
   std::string json;          // the complete estimate, as `voxdag plan --json` prints it
 };
 
-// Estimates a build. Creates no files.
+// Returns an estimate of a build. Creates no files.
 BuildPlan plan(const BuildOptions& options, const BuildHooks& hooks = {});
 
 }  // namespace voxdag

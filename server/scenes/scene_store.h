@@ -58,8 +58,8 @@ class SceneStore {
   std::vector<Scene> list(const std::string& after, size_t limit);
   // Returns the state of an unfinished upload.
   std::optional<UploadState> upload(const std::string& name);
-  // Removes a scene and its unfinished upload. Removes the files first, so that it frees space on a
-  // full disk. Returns false if the name has neither a scene nor an upload. Throws
+  // Removes a scene and its unfinished upload. Removes the files first, so that the call frees
+  // space on a full disk. Returns false if the name has neither a scene nor an upload. Throws
   // RequestError{kConflict} if the scene is being uploaded.
   bool remove(const std::string& name);
   // Finishes removals that a crash or a full disk interrupted.

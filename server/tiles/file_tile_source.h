@@ -16,8 +16,8 @@ namespace voxdag::server {
 class FileTileSource : public TileSource {
  public:
   // Opens the file. Throws Error if it is not a valid DAG. Reads only the file's header and
-  // checksum table. If one of their pages cannot be read, throws Error{kIo}; such a page never ends
-  // the process. `manifests`, if not null, caches manifests.
+  // checksum table. If one of their pages cannot be read, throws Error{kIo} instead of ending the
+  // process with SIGBUS. `manifests`, if not null, caches manifests.
   FileTileSource(const std::string& path, const FileIdentity& identity,
                  std::shared_ptr<ManifestCache> manifests = nullptr);
   // Like the constructor above, for a file that is already mapped.

@@ -7,9 +7,10 @@
 
 namespace voxdag::server {
 
-// Returns a Problem unchanged. Keeps the message of a RequestError, and the code of an Error. The
-// message of an Error is replaced by a fixed text, because it may contain paths of the server.
-// std::bad_alloc becomes the problem `busy`; any other exception becomes the problem `internal`.
+// If `error` is a Problem, returns it unchanged. The problem of a RequestError has the
+// RequestError's message. The problem of an Error has the Error's code, but a fixed text instead of
+// its message, because the message may contain paths of the server. std::bad_alloc becomes the
+// problem `busy`; any other exception becomes the problem `internal`.
 Problem public_problem(const std::exception& error);
 
 }  // namespace voxdag::server

@@ -37,10 +37,11 @@ class PartialDag {
  private:
   using Parts = std::vector<const Part*>;
   uint64_t add_parts(const Cube& cube, const Parts& parts);
-  // Adds a node of level `level` that represents a coarse brick. All occupied cells are solid.
+  // These functions add a node and return its word offset. add_coarse() adds the node of a coarse
+  // brick, whose occupied cells are solid.
   uint64_t add_coarse(uint32_t level, uint64_t brick);
   uint64_t add_solid(uint32_t level);
-  // Adds a node whose octants in `mask` are solid.
+  // Adds a node of which the octants in `mask` are solid and the others empty.
   uint64_t add_octants(uint32_t level, uint32_t mask);
   uint64_t add_node(uint32_t level, uint32_t mask, const std::vector<uint64_t>& children);
   uint64_t add_brick(uint64_t brick);

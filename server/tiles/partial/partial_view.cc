@@ -16,7 +16,7 @@ namespace voxdag::server {
 namespace {
 
 constexpr double kReadIntervalS = 1;
-constexpr double kMaxCpuShare = 0.05;  // maximum share of one core for reading
+constexpr double kMaxCpuShare = 0.05;  // maximum share of one core's time for reading
 constexpr double kMaxReadingS = 0.5;   // maximum wall time of one reading
 constexpr size_t kDagDigits = 32;
 

@@ -127,7 +127,7 @@ export class ColorStore {
     for (let at = this.next(free); words[4 * at + 3] !== 0; at = this.next(at)) {
       const home = this.homeOf(words.subarray(4 * at, 4 * at + 3));
       const mask = this.entries - 1;
-      // The probe for this entry starts behind the free entry, so this entry is not moved.
+      // The probe for this entry starts after the free entry, so this entry is not moved.
       if ((at - home & mask) < (at - free & mask)) continue;
       this.write(free, words.slice(4 * at, 4 * at + 4));
       free = at;

@@ -159,7 +159,8 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 `;
 
 const kBlocked = `
-// True if a cell within the distance reach blocks the light from the direction toward.
+// True if a cell blocks the light from a direction. toward: the unit vector of this direction;
+// reach: the maximum distance of the cell.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
   // In a narrow place the start may be in an occupied cell. The second attempt starts on the path
   // of the camera ray, which is free unless the eye is in an occupied cell.
@@ -388,7 +389,7 @@ uniform usampler2D u_colors;
 uniform bool u_colored;      // true if u_colors has colors
 uniform sampler2D u_before;
 uniform vec2 u_haze;  // x: distance at which haze begins; y: 1 / the scene's diagonal
-uniform float u_share;  // weight of this sample: 1 / number of samples so far; 1: no u_before
+uniform float u_share;  // weight of this sample: 1 / number of samples; if 1, u_before is unused
 uniform float u_range;       // divisor of the light that is written to the target (passes.js)
 uniform vec2 u_floor;
 uniform vec3 u_floor_center;

@@ -106,10 +106,10 @@ void note_tile(uint slot) {
 }
 
 #ifdef WIRE
-// Updates wire when the ray enters an occupied cell of the scale u_wire_scale. The ray hits a line
-// if it enters close to an edge of the cell's face. Lines fade with their distance, and where cubes
-// are only a few pixels wide. They also fade with each further cube that the ray enters behind
-// them, because they would hide the surface otherwise.
+// Updates the variable wire when the ray enters an occupied cell of the scale u_wire_scale. The ray
+// hits a line if it enters close to an edge of the cell's face. Lines fade with their distance, and
+// where cubes are only a few pixels wide. They also fade with each further cube that the ray enters
+// behind them, because they would hide the surface otherwise.
 void note_wire(ivec3 position, int scale, int axis, float t) {
   if (scale != u_wire_scale || axis < 0) return;
   wire *= kFront;
