@@ -118,8 +118,7 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// Returns the start of a ray to the light. The start is so far above a smooth surface that the
-// steps between the surface's cells do not block the ray.
+// Returns the start of a ray to the light, far enough out that the surface's steps do not block it.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
@@ -159,8 +158,7 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 `;
 
 const kBlocked = `
-// True if a cell blocks the light from a direction. toward: the unit vector of this direction;
-// reach: the maximum distance of the cell.
+// True if a cell blocks the light. toward: direction to the light; reach: maximum distance.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
   // In a narrow place the start may be in an occupied cell. The second attempt starts on the path
   // of the camera ray, which is free unless the eye is in an occupied cell.
@@ -457,8 +455,7 @@ void main() {
 // Writes one texel per block of u_block x u_block pixels. Word 1: Hit.missing of the widest cell
 // whose tile is missing, or else of a shadow's ray. Word 2: the width of this cell in pixels, and
 // the brightness of the pixel u_sample, which differs between frames. Word 3: the slot of a tile
-// that this pixel uses, and half the number of its ray's steps. Word 4: the distance t of this
-// ray's hit.
+// that this pixel uses, and half the number of its ray's steps. Word 4: the hit's distance t.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;
