@@ -107,7 +107,7 @@ TEST_F(HostileView, SeesThatColorsAreDamaged) {
     pages.push_back("colors?pages=6." + std::to_string(i >> 6) + '.' + std::to_string(i >> 3 & 7) +
                     '.' + std::to_string(i & 7));
   for (const std::string& page : pages) whole.push_back(get(page).body);
-  flip(data + 100000);  // the color data is 240 KB long; this block has no levels
+  flip(data + 100000);  // this block has only color data, which is 240 KB long
   size_t refused = 0;
   for (size_t i = 0; i < pages.size(); ++i) {
     const ClientResponse answer = get(pages[i]);

@@ -190,9 +190,9 @@ TEST_F(InterruptedUpload, IsRefusedByAServiceThatStops) {
   EXPECT_EQ(put_part("0123456789", 5, 10).status, 201);
 }
 
-// A job is submitted while the last bytes of a new version of its scene arrive. It uses the old
-// version, so the upload ends with a conflict. After the job has ended, an empty part finishes the
-// upload.
+// A job is submitted while the last bytes of a new version of its scene arrive. The job uses the
+// old version, so the upload ends with a conflict. After the job has ended, an empty part finishes
+// the upload.
 TEST_F(InterruptedUpload, IsFinishedAfterAJobThatUsedTheScene) {
   config_.jobs.min_free_disk_bytes = 100 * kMiB;
   start();

@@ -220,8 +220,8 @@ TEST_F(JobRecovery, AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   release();
 }
 
-// A job is suspended after its process was requested but before it runs the job's program. In this
-// time the process has the service's handler of SIGTERM, so the signal alone would be lost.
+// A job is suspended after its process was requested but before the process runs the job's program.
+// In this time the process has the service's handler of SIGTERM, so the signal alone would be lost.
 // Nevertheless the job stops.
 TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   use_program(R"(sleep 1; echo '{"json":"{}","message":"result"}')");

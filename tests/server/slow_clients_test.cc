@@ -149,8 +149,8 @@ TEST_F(SlowClients, BodiesWithoutEndDoNotBlockOthers) {
   }
 }
 
-// The service closes connections whose answers are not read when other clients want to connect. The
-// kernel's queues hold at most 300 KiB of the answers of each connection.
+// When other clients want to connect, the service closes connections whose answers are not read.
+// The kernel's queues hold at most 300 KiB of the answers of each connection.
 TEST_F(SlowClients, UnreadAnswersDoNotBlockOthers) {
   start();
   std::string requests;
