@@ -62,8 +62,8 @@ TEST_F(Radius, LargeRadius) {
   for (const int radius : {3, 5, 16}) expect_sealed(oracle::SolidKind::kHoles, 32, radius);
 }
 
-// A build as one subvolume gives the same bytes as a build as many, with any memory and any number
-// of threads.
+// A build with one subvolume gives the same bytes as a build with many subvolumes, with any memory
+// and any number of threads.
 TEST_F(Radius, RunOptionsNeverShow) {
   for (const auto& [kind, radius] :
        {std::pair(oracle::SolidKind::kHoles, 1), std::pair(oracle::SolidKind::kTetrahedra, 6)}) {

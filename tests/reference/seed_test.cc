@@ -106,7 +106,7 @@ TEST_F(Seeds, RunOptionsNeverShow) {
       EXPECT_EQ(report.solid->interior, whole.solid->interior);
     }
   }
-  EXPECT_GE(interiors.size(), 3u);  // of the cavity, of the space between the spheres, and 0
+  EXPECT_GE(interiors.size(), 3u);  // the cavity, the space between the spheres, and 0
 }
 
 TEST_F(Seeds, PointsOutsideTheGridAreRefused) {

@@ -1,5 +1,5 @@
-// Builds of solids whose work is divided, because an enclosed part exceeds the memory, or shared,
-// through the cache. The bytes are the same as in other builds of the scene.
+// Builds of solids whose work is divided (because an enclosed part exceeds the memory) or shared
+// (through the cache). The bytes are the same as in other builds of the scene.
 #include <array>
 
 #include "tests/oracle/solid/solids.h"

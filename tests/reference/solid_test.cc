@@ -60,8 +60,8 @@ TEST_F(SolidBuilds, EqualTheOracle) {
   });
 }
 
-// A grid of 256 voxels per edge is built as one subvolume and as many. The bytes and the counts of
-// the solid are the same.
+// A grid of 256 voxels per edge is built with one subvolume and with many subvolumes. The bytes and
+// the counts of the solid are the same.
 TEST_F(SolidBuilds, RunOptionsNeverShow) {
   for_each_solid([&](oracle::SolidKind kind) {
     for (const SolidName rule : kSolids) {

@@ -59,8 +59,8 @@ sockaddr_in next_loopback_address() {
   return address;
 }
 
-// Returns false after twenty polls of one second without data. Many short polls, because a pause of
-// the machine then uses up only one of them, and is not reported as a finding.
+// Returns false after twenty polls of one second without data. There are many short polls, because
+// a pause of the machine then uses up only one of them and is not reported as a finding.
 bool has_something_to_read(int fd) {
   for (int i = 0; i < kMaxWaits; ++i) {
     pollfd waiting{fd, POLLIN, 0};

@@ -1,5 +1,6 @@
 // Runs a fuzz target, without a fuzzer, once on each of the given files and on each file in the
-// given folders. With it, the corpus and past findings are regression tests for every compiler.
+// given folders. With this program, the corpus and past findings are regression tests for every
+// compiler.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Checks that all fuzz targets for scene formats make of a file.
+// The checks of a file that all fuzz targets for scene formats share.
 #pragma once
 
 #include <string>
