@@ -33,11 +33,12 @@ class DagExport {
   const AxisTurn turn_;
   MemoryBudget budget_;
   const DagView dag_;
-  // Makes filled_ for a grid, unless the last call was for the same grid.
+  // Sets filled_ to the filled DAG of the grid with 2^grid_levels cells per edge, unless the last
+  // call was for the same grid.
   void fill(const DagView& dag, uint32_t grid_levels);
 
   std::optional<TurnedDag> turned_;  // made by the first write() if turn_ changes the axes
-  std::optional<FilledDag> filled_;  // of the last written grid, for --outside
+  std::optional<FilledDag> filled_;  // filled DAG of the last written grid, for --outside
 };
 
 }  // namespace voxdag::query

@@ -32,7 +32,8 @@ struct ExportJob {
   const CancelToken& cancel;
   AxisTurn turn;
   ExportOptions options;
-  // With options.outside: the DAG of the selection's grid with its enclosed space filled.
+  // With options.outside: the DAG of the selection's grid with its enclosed space filled
+  // (filled_dag.h).
   const DagView* filled = nullptr;
 
   // Returns the world coordinate of the grid's low corner along an axis of the turned grid.

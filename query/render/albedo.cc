@@ -82,8 +82,8 @@ ShadeColors::ShadeColors(const DagView& dag, Shade shade) : dag_(dag), shade_(sh
   if (shade == Shade::kSharing && !dag.empty()) count_places();
 }
 
-// Counts the places from the root to the bricks. A node occurs once for each place of each of its
-// parents. Numbers that exceed 64 bits are UINT64_MAX.
+// Counts the places of each node in the octree, from the root to the bricks. For each place of a
+// node, each of its children has one more place. Numbers that exceed 64 bits are UINT64_MAX.
 void ShadeColors::count_places() {
   const uint32_t brick_level = dag_.grid_levels() - kBrickLevels;
   for (uint32_t level = 0; level <= brick_level; ++level)

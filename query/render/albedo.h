@@ -1,9 +1,9 @@
 // The share of light that a surface reflects: from the colors of a file, or a property of the DAG
 // for figures (Shade). Without colors, surfaces are gray plaster.
 //
-//   sharing   how often the node or brick at the surface occurs in the octree: from dark violet
-//   (once)
-//             over green to yellow (as often as the most frequent brick), on a logarithmic scale
+//   sharing   how often the node or brick at the surface occurs in the octree, on a logarithmic
+//             scale: from dark violet (once) over green to yellow (as often as the most frequent
+//             brick)
 //   level     the level of the visible cell: a color for each level
 //   normal    the surface's normal: red, green and blue are (x + 1) / 2, (y + 1) / 2, (z + 1) / 2
 #pragma once
@@ -61,7 +61,7 @@ class ShadeColors {
   const Shade shade_;
   // For each level, the number of places of each node or brick, by half its word offset.
   std::vector<std::vector<uint64_t>> places_;
-  double log_max_places_ = 0;  // of the bricks
+  double log_max_places_ = 0;  // logarithm of the largest number of places of a brick
 };
 
 // Returns the bytes that ShadeColors allocates.

@@ -46,7 +46,7 @@ BrickRows::BrickRows(MemoryBudget& budget, uint64_t bricks, uint64_t cube_sides,
 
 void BrickRows::add(const Position& low, uint64_t mask) {
   const auto at = [&](size_t axis) { return static_cast<uint64_t>(low[axis] / kBrickEdge); };
-  // The keys of axis 2. sorted(0) turns them to axis 0.
+  // The key is for axis 2; sorted(0) converts it to axis 0.
   bricks_[singles_++] = {RowBrick::key_of(at(2), at(1), at(0)), mask};
 }
 

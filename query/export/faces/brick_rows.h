@@ -21,8 +21,8 @@
 
 namespace voxdag::query {
 
-// A brick at a position in bricks. The key orders the bricks by slab, v and u, 19 bits each. Its
-// two lowest bits are set for bricks without faces in one direction.
+// A brick. The key has its position in bricks: slab, v and u, with 19 bits each, highest first. The
+// two lowest bits of the key mark bricks without faces in one direction.
 struct RowBrick {
   static constexpr int kCoordinateBits = 19;
   static constexpr int kFlagBits = 2;
@@ -73,7 +73,7 @@ class BrickRows {
   void sort();
 
   PageBuffer<RowBrick> bricks_, scratch_;
-  size_t singles_ = 0;  // bricks_ begins with the single bricks
+  size_t singles_ = 0;  // number of single bricks, with which bricks_ begins
   size_t size_ = 0;
   std::vector<Cube> cubes_;
 };

@@ -13,7 +13,7 @@ namespace voxdag::query {
 template <class T>
 class GrowingBuffer {
  public:
-  // `what` names the memory in error messages. It must outlive the buffer.
+  // `what` names the memory in error messages. This text must outlive the buffer.
   GrowingBuffer(MemoryBudget& budget, std::string_view what) : budget_(&budget), what_(what) {}
 
   // Throws Error{kOutOfMemory} if the list does not fit in the budget.

@@ -63,9 +63,9 @@ int square_of_gap(int64_t d) {
   return gap * gap;
 }
 
-// Replaces each number by the minimum, over the steps d from -width to width, of square_of_gap(d)
-// and the number d steps away. The numbers are `outer` blocks of (8 + 2 width) rows of `row`
-// numbers; a step is one row. The result has 8 rows for each block.
+// Replaces each number by the minimum, over the steps d from -width to width, of the sum of
+// square_of_gap(d) and the number d steps away. The numbers are `outer` blocks of (8 + 2 width)
+// rows of `row` numbers; a step is one row. The result has 8 rows for each block.
 void min_along(const std::vector<uint16_t>& from, size_t outer, size_t row, int width,
                std::vector<uint16_t>& to) {
   const auto rows = static_cast<size_t>(kBandLeafEdge + 2 * width);
@@ -142,7 +142,7 @@ void BandTile::distances(const Position& at, BandSquares& out) {
 }
 
 // Computes (2 distance)^2 from each cell of a leaf to the nearest cell that is set, or to the
-// nearest empty cell. It is 0 for cells of this kind.
+// nearest empty cell. The result is 0 for cells that are of this kind themselves.
 void BandTile::distances_to(bool is_set, const Position& at, BandSquares& out) {
   const auto limit = static_cast<uint16_t>(4 * width_ * width_);
   const auto window = static_cast<size_t>(kBandLeafEdge + 2 * width_);

@@ -46,8 +46,8 @@ class BandTile {
   int64_t edge() const { return edge_; }
 
   enum class Contents { kEmpty, kFull, kMixed };
-  // Returns the contents of a leaf of the tile, including its margin. `at` is the leaf's position
-  // in the tile, in cells.
+  // Returns the contents of a leaf of the tile and of the leaf's margin. `at` is the leaf's
+  // position in the tile, in cells.
   Contents contents(const Position& at) const;
   // Computes the distances of a leaf's cells.
   void distances(const Position& at, BandSquares& out);
@@ -140,7 +140,7 @@ class BandWalk {
 
 // Visits the parts of a level set: calls visit_leaf(low, at, tile) for each leaf with cells in the
 // band; tile.distances(at) computes its distances. Calls visit_full(low, edge) for each cube of set
-// cells that are all farther from the surface than `width`. Both cubes can extend beyond
+// cells that are all farther from the surface than `width`. Leaves and cubes can extend beyond
 // band_domain(). Both functions return a bool; false ends the walk.
 template <class VisitLeaf, class VisitFull>
 void for_each_band_part(const DagView& dag, const Selection& selection, int width,

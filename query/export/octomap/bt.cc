@@ -71,9 +71,9 @@ class BtTree {
         write_upper(OctreeRegion::child_corner(corner, child, edge / 2), edge / 2);
   }
 
-  // Adds the nodes of a cube to the buffer, and returns its content. Adds no nodes for a cube that
-  // is full, or that has no voxels unless has_known_part() is true: the node of its parent has its
-  // state. With `is_top`, always adds at least one node.
+  // Adds the nodes of a cube to the buffer, and returns its content. Adds no nodes for a full cube,
+  // and none for a cube without voxels unless has_known_part() is true: the state of such a cube is
+  // in the node of its parent. With `is_top`, always adds at least one node.
   Content add_nodes(const Position& corner, int64_t edge, bool is_top) {
     if (!is_top && edge == kBlockEdge) return add_block(corner);
     if (!is_top && !region_.has_voxels(corner, edge) && !region_.has_known_part(corner, edge))

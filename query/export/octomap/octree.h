@@ -1,8 +1,9 @@
-// OctoMap's octree, for the exports to .bt and .ot. The octree has 16 levels. The origin of its
-// coordinates is in its middle. The exporter rounds the position of the grid to cells, so that the
-// origin of the octree is at most half a voxel from the origin of the scene. After this shift,
-// octree cubes are in general not cubes of the grid. So the exporters read the cells of one octree
-// block after the other, 32^3 cells each, and make the nodes from these cells.
+// OctoMap's octree, for the exports to .bt and .ot. The octree has 16 levels. The origin of the
+// octree's coordinates is its center. The exporter rounds the position of the grid to a whole
+// number of cells, so that the origin of the octree is at most half a voxel from the origin of the
+// scene. After this shift, octree cubes are in general not cubes of the grid. So the exporters read
+// the cells of one octree block after the other, 32^3 cells each, and make the nodes from these
+// cells.
 #pragma once
 
 #include <algorithm>
@@ -18,7 +19,7 @@
 namespace voxdag::query {
 
 inline constexpr uint32_t kOctoMapLevels = 16;
-// Edge of the octree blocks whose cells are in memory at the same time, in cells.
+// Edge of an octree block, in cells. The cells of one block are in memory at the same time.
 inline constexpr int64_t kBlockEdge = 32;
 inline constexpr uint32_t kBlockLevels = 5;
 inline constexpr int64_t kHalfTree = int64_t{1} << (kOctoMapLevels - 1);
@@ -112,8 +113,9 @@ class OctreeRegion {
     }
     return region;
   }
-  // True if the cube is only partly in the region, and an octree cube of kKnownEdge cells per edge
-  // is in both. Such a cube is divided, so that its parts in the region can be free.
+  // True if the cube is only partly in the region, and some octree cube of kKnownEdge cells per
+  // edge is inside both the cube and the region. Such a cube is divided, so that its parts in the
+  // region can be free.
   bool has_known_part(const Position& corner, int64_t edge) const {
     if (region_.contains(corner, edge)) return false;
     for (size_t axis = 0; axis < 3; ++axis) {

@@ -82,9 +82,10 @@ class OtTree {
         colors_(job.file),
         upper_(job.budget, "the upper nodes of the octree") {}
 
-  uint64_t nodes = 0, inner_nodes = 0, voxels = 0;  // of the first run
+  uint64_t nodes = 0, inner_nodes = 0, voxels = 0;  // found by the first run
 
-  // measure() must run before write(). `advance` receives the bytes of nodes of known values.
+  // measure() is the first run, and must precede write(). It passes to `advance` the bytes of all
+  // nodes except inner nodes larger than kBufferedEdge.
   void measure(Write advance) {
     write_ = std::move(advance);
     add_upper(kRootCorner, kRootEdge);
@@ -102,7 +103,8 @@ class OtTree {
   static constexpr int64_t kRootEdge = int64_t{1} << kOctoMapLevels;
   static constexpr Position kRootCorner = {-kHalfTree, -kHalfTree, -kHalfTree};
 
-  // These functions add the nodes of a cube, and return its node; nullopt if the cube is unknown.
+  // These functions add the nodes of a cube, and return the cube's node; nullopt if the cube is
+  // unknown.
   std::optional<OtNode> add_upper(const Position& corner, int64_t edge) {
     if (edge == kBufferedEdge) {
       const std::optional<OtNode> node = add_buffered(corner, edge, 0);

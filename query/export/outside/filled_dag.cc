@@ -34,7 +34,8 @@ class LevelReader {
       at += 1 + (static_cast<uint64_t>(popcount8(children.mask)) << wide);
     }
   }
-  // The rows of a level, by half the word offset of the node or brick: each has at least two words.
+  // Returns an array for the rows of a level. Its index is half the word offset of a node or brick,
+  // because each of these has at least two words.
   PooledArray<uint32_t> row_numbers(uint32_t depth) const {
     return {memory_, dag_.level(depth).words.size() / 2 + 1};
   }
@@ -86,10 +87,10 @@ class LevelReader {
   }
 
   const DagView& dag_;
-  const uint32_t depth_;  // of the bricks
+  const uint32_t depth_;  // depth of the bricks
   PooledMemory& memory_;
   NodeLevels levels_;
-  PooledArray<uint32_t> rows_;  // of the level that was read last
+  PooledArray<uint32_t> rows_;  // rows of the level that was read last
 };
 
 // Converts a sub-DAG to the words of a DagView, from the bricks upwards.

@@ -17,10 +17,10 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // the header has 32 bits for it
+constexpr uint64_t kMaxGlbBytes = (uint64_t{1} << 32) - 1;  // the header has 32 bits for the size
 constexpr uint64_t kMaxGlbJsonBytes = 4096;                 // including chunk headers
 constexpr uint64_t kGlbColorBytes = 4 * sizeof(uint16_t);
-// The largest index has a special meaning in glTF.
+// glTF reserves the largest 16-bit index, 65535.
 constexpr uint32_t kMaxShortIndexedVertices = 65535;
 constexpr uint32_t kMaxShortPosition = 65535;
 
@@ -49,7 +49,7 @@ struct GlbLayout {
     color_offset = position_bytes + (index_bytes + 3) / 4 * 4;
     bytes = color_offset + (job.has_colors ? vertices * kGlbColorBytes : 0);
   }
-  // Bytes of a position. Each must begin at a multiple of four bytes.
+  // Bytes of a position. Each position must begin at a multiple of four bytes.
   uint64_t position_size() const {
     return has_short_positions ? 4 * sizeof(uint16_t) : 3 * sizeof(float);
   }
@@ -110,7 +110,7 @@ std::string glb_mesh_json(const ExportJob& job, const GlbLayout& layout) {
                                      : "");
 }
 
-// A surface without faces has a node without a mesh.
+// Returns the JSON text. The node has no mesh if the surface has no faces.
 std::string glb_json(const ExportJob& job, const GlbLayout& layout) {
   std::array<double, 3> place{};
   for (size_t axis = 0; axis < 3; ++axis)
@@ -191,8 +191,8 @@ void put_glb(const ExportJob& job, const SurfaceMesh& mesh, const GlbLayout& lay
   if (job.has_colors) put_colors(mesh.vertices(), file, stage);
 }
 
-// Finds grids that fit even if no faces are merged and no cells share a vertex: a cell has up to 6
-// faces of 2 triangles, and 8 vertices.
+// Refuses the file, and suggests grids that fit even if no faces are merged and no cells share a
+// vertex: a cell has up to 6 faces of 2 triangles, and 8 vertices.
 [[noreturn]] void refuse_glb(const ExportJob& job, uint64_t max_bytes) {
   constexpr uint64_t kCellBytes = 6 * 6 * sizeof(uint32_t) + 8 * 3 * sizeof(float);
   const uint64_t cell_bytes = kCellBytes + (job.has_colors ? 8 * kGlbColorBytes : 0);
@@ -219,7 +219,8 @@ ExportReport write_glb(const ExportJob& job) { return write_glb_within(job, kMax
 
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   const uint64_t most = max_bytes - kMaxGlbJsonBytes;
-  // More rectangles than this have indices of 32 bits: at most 12 rectangles have a common vertex.
+  // More rectangles than this need 32-bit indices, because a vertex belongs to at most 12
+  // rectangles: they have over 65535 vertices.
   constexpr uint64_t kFewRectangles = 3 * uint64_t{kMaxShortIndexedVertices};
   std::optional<Surface> surface(std::in_place, job,
                                  std::max(kFewRectangles, most / (6 * sizeof(uint32_t))));

@@ -119,7 +119,7 @@ void Surface::find(std::span<const RowBrick> bricks, Direction direction, Export
 void Surface::add_slab(std::span<const RowBrick> slab, std::span<const RowBrick> next,
                        Direction direction, ExportStage& stage) {
   for (PlaneRow& plane : planes_) plane.v = -2;
-  size_t at = 0;  // in `next`
+  size_t at = 0;  // index in `next`
   for (size_t i = 0; i < slab.size() && !is_over_limit(); ++i) {
     const RowBrick& brick = slab[i];
     stage.advance(1);
@@ -154,7 +154,7 @@ void Surface::add_brick(const RowBrick& brick, uint64_t neighbor, Direction dire
   if (faces == 0) return;
   const auto low_u = static_cast<uint32_t>(brick.u() * kBrickEdge);
   for (uint64_t rest = orders_[direction.axis](faces); rest != 0;) {
-    // The next cells: as many as are in one row and have one color.
+    // Takes the next cells that are adjacent in a row; with colors, only one cell.
     const int bit = std::countr_zero(rest);
     const int in_row = std::min(std::countr_one(rest >> bit), kBrickEdge - bit % kBrickEdge);
     voxdag_reader::Rgb color{};

@@ -71,10 +71,10 @@ class Surface {
 
   const ExportJob& job_;
   const uint64_t max_rectangles_;
-  const bool clips_faces_;  // the bricks have more cells than the region
+  const bool clips_faces_;  // the bricks also have cells outside the region
   voxdag_reader::ColorCursor colors_;
   uint64_t voxels_ = 0;
-  uint64_t listed_bricks_ = 0;  // for each axis
+  uint64_t listed_bricks_ = 0;  // number of bricks that are sorted for each axis
   const std::array<BrickRowOrder, 3> orders_ = {BrickRowOrder(0), BrickRowOrder(1),
                                                 BrickRowOrder(2)};
   std::array<std::vector<Run>, 16> runs_;  // of the current row of bricks: 4 planes, 4 rows each

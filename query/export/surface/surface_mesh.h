@@ -86,7 +86,7 @@ class SurfaceMesh {
   VertexTable vertices_;
   GrowingBuffer<uint32_t> indices_;
 
-  // A vertex on the border of a rectangle, and its coordinate along its side.
+  // A vertex on a side of a rectangle, and the vertex's coordinate along this side.
   struct SidePoint {
     uint32_t at, vertex;
   };

@@ -48,8 +48,9 @@ VdbSize level_set_size(const ExportJob& job, const Selection& selection, const V
   return size;
 }
 
-// Returns the level set of the selected voxels. All values in a leaf, and the sign of all tiles,
-// are right. Throws Error{kInvalidInput} if the voxels are a surface without an inside.
+// Returns the level set of the selected voxels. Leaves have exact distances, limited to the width
+// of the band. Tiles have only the right sign. Throws Error{kInvalidInput} if the voxels are a
+// surface without an inside.
 inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t leaves) {
   const int width = band_of(job), limit = 4 * width * width;
   const Region domain = band_domain(job.selection, width);
@@ -57,7 +58,7 @@ inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t lea
   const auto grid = empty_vdb_grid<openvdb::FloatGrid>(job, "surface");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->setTree(std::make_shared<openvdb::FloatTree>(background));
-  std::vector<float> distances(static_cast<size_t>(limit) + 1);  // by the square
+  std::vector<float> distances(static_cast<size_t>(limit) + 1);  // by (2 distance)^2
   for (int i = 0; i <= limit; ++i)
     distances[static_cast<size_t>(i)] = static_cast<float>(std::sqrt(i) / 2 * job.cell_edge());
   // A set cell at least 1.5 cells from the surface: all 26 cells around it are set.

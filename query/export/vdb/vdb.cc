@@ -82,8 +82,8 @@ auto with_vdb_errors(const ExportJob& job, const Work& work) {
   }
 }
 
-// True if full cubes are tiles of the grid of voxels. A grid of colors has no tiles, because the
-// voxels of a cube have different colors.
+// True if full cubes are stored as tiles. With colors they are not, because the voxels of a cube
+// can have different colors.
 bool has_tiles(const ExportJob& job) { return !job.has_colors; }
 
 // Calls visit_brick() for the bricks of a selection. If the job has tiles, calls visit_cube()
@@ -99,9 +99,9 @@ void for_each_vdb_part(const ExportJob& job, const Selection& selection,
 
 // Counts the voxels of a selection, and the bytes of memory for its trees, whose nodes have the
 // sizes `node`. Stops when there are more than `limit` bytes. Bricks are visited in Morton order,
-// so all bricks of a node come one after the other and the node is counted once. A full cube is a
-// tile of the node that contains it, or tiles of several nodes if it is larger than a node's child.
-// Calls steps.advance() for each brick and each full cube.
+// so all bricks of a node come one after the other and the node is counted once. A full cube takes
+// memory only for the nodes that contain it. If it has 4096 or more cells per edge, it consists of
+// tiles in the root's table. Calls steps.advance() for each brick and each full cube.
 template <class Steps>
 VdbSize vdb_size(const ExportJob& job, const Selection& selection, const VdbNodeBytes& node,
                  uint64_t limit, Steps&& steps) {
@@ -316,7 +316,7 @@ ExportReport write_vdb(const ExportJob& job) {
     }
     return write_grid_file(job, voxels, std::max<uint64_t>(min_bytes, 1),
                            [&](std::ostream& stream) {
-                             // Uses no codec, because some readers may lack it.
+                             // Uses no codec, because some readers may lack that codec.
                              // COMPRESS_ACTIVE_MASK only leaves out inactive values.
                              openvdb::io::Stream out(stream);
                              out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);
