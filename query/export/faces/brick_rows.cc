@@ -9,7 +9,7 @@ namespace {
 
 // For fewer bricks than this, std::sort is faster than the radix sort.
 constexpr size_t kFewBricks = 1024;
-constexpr int kDigitBits = 10;
+constexpr int kKeyDigitBits = 10;
 
 struct KeyDigit {
   int shift, bits;
@@ -20,17 +20,18 @@ constexpr std::array<KeyDigit, 6> kKeyDigits = [] {
   std::array<KeyDigit, 6> digits{};
   for (size_t i = 0; i < 6; ++i) {
     const int begin = RowBrick::kFlagBits + static_cast<int>(i / 2) * RowBrick::kCoordinateBits;
-    digits[i] = i % 2 == 0 ? KeyDigit{begin, kDigitBits}
-                           : KeyDigit{begin + kDigitBits, RowBrick::kCoordinateBits - kDigitBits};
+    digits[i] = i % 2 == 0
+                    ? KeyDigit{begin, kKeyDigitBits}
+                    : KeyDigit{begin + kKeyDigitBits, RowBrick::kCoordinateBits - kKeyDigitBits};
   }
   return digits;
 }();
 
-void sort_by_digit(std::span<const RowBrick> from, std::span<RowBrick> to, KeyDigit digit) {
+void sort_bricks_by_digit(std::span<const RowBrick> from, std::span<RowBrick> to, KeyDigit digit) {
   const auto of = [digit](const RowBrick& brick) {
     return brick.key >> digit.shift & ((uint64_t{1} << digit.bits) - 1);
   };
-  std::array<uint64_t, size_t{1} << kDigitBits> next{};
+  std::array<uint64_t, size_t{1} << kKeyDigitBits> next{};
   for (const RowBrick& brick : from) ++next[of(brick)];
   uint64_t sum = 0;
   for (uint64_t& at : next) sum += std::exchange(at, sum);
@@ -98,7 +99,7 @@ void BrickRows::sort() {
   for (const RowBrick& brick : all) varying |= brick.key ^ all[0].key;
   for (const KeyDigit digit : kKeyDigits) {
     if ((varying >> digit.shift & ((uint64_t{1} << digit.bits) - 1)) == 0) continue;
-    sort_by_digit({bricks_.data(), size_}, {scratch_.data(), size_}, digit);
+    sort_bricks_by_digit({bricks_.data(), size_}, {scratch_.data(), size_}, digit);
     std::swap(bricks_, scratch_);
   }
 }

@@ -19,22 +19,22 @@
 namespace voxdag::query {
 namespace {
 
-using MeshPoint = std::array<int64_t, 3>;
+using SurfacePoint = std::array<int64_t, 3>;
 
-struct DecodedMesh {
-  std::vector<MeshPoint> vertices;
+struct SurfaceTriangles {
+  std::vector<SurfacePoint> vertices;
   std::vector<std::array<uint32_t, 3>> triangles;
 };
 
 // Decodes a .glb file. `low` is the low corner of the region.
-DecodedMesh decode_mesh(const std::string& bytes, const Position& low) {
+SurfaceTriangles decode_surface(const std::string& bytes, const Position& low) {
   const auto number = [&](auto value, size_t at) {
     std::memcpy(&value, &bytes.at(at), sizeof(value));
     return value;
   };
   const auto json_size = number(uint32_t{}, 12);
   const auto document = nlohmann::json::parse(bytes.substr(20, json_size));
-  DecodedMesh mesh;
+  SurfaceTriangles mesh;
   if (!document.contains("meshes")) return mesh;
   const auto& accessors = document["accessors"];
   const size_t binary = 28 + json_size;
@@ -43,7 +43,7 @@ DecodedMesh decode_mesh(const std::string& bytes, const Position& low) {
   };
   const bool is_short = accessors[0]["componentType"] == 5123;
   for (size_t i = 0; i < accessors[0]["count"]; ++i) {
-    MeshPoint& point = mesh.vertices.emplace_back(low);
+    SurfacePoint& point = mesh.vertices.emplace_back(low);
     for (size_t axis = 0; axis < 3; ++axis)
       point[axis] += is_short
                          ? number(uint16_t{}, offset(0) + 8 * i + 2 * axis)
@@ -60,18 +60,18 @@ DecodedMesh decode_mesh(const std::string& bytes, const Position& low) {
 
 using Face = std::pair<Position, int>;  // a cell, and the direction 2 * axis + (1 if upward)
 
-Position neighbor_of(Position cell, int direction) {
+Position next_cell(Position cell, int direction) {
   cell[static_cast<size_t>(direction / 2)] += direction % 2 != 0 ? 1 : -1;
   return cell;
 }
 
 // Returns the faces that the triangles cover. The doubled area of the triangles at each face must
 // be exactly the doubled area of whole faces: each face is covered once.
-std::set<Face> faces_of(const DecodedMesh& mesh) {
+std::set<Face> covered_faces(const SurfaceTriangles& mesh) {
   std::map<Face, double> covered;
   for (const auto& triangle : mesh.triangles) {
-    const MeshPoint &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]],
-                    &c = mesh.vertices[triangle[2]];
+    const SurfacePoint &a = mesh.vertices[triangle[0]], &b = mesh.vertices[triangle[1]],
+                       &c = mesh.vertices[triangle[2]];
     size_t axis = 0;
     while (a[axis] != b[axis] || a[axis] != c[axis]) ++axis;
     const size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -79,7 +79,7 @@ std::set<Face> faces_of(const DecodedMesh& mesh) {
     EXPECT_NE(area, 0) << "a degenerate triangle";
     // Samples the triangle at points that no edge between integer points of small triangles meets.
     constexpr int kSamples = 7;
-    const auto side = [&](const MeshPoint& p, const MeshPoint& q, double s, double t) {
+    const auto side = [&](const SurfacePoint& p, const SurfacePoint& q, double s, double t) {
       return (static_cast<double>(q[u] - p[u]) * (t - static_cast<double>(p[v])) -
               static_cast<double>(q[v] - p[v]) * (s - static_cast<double>(p[u]))) *
              (area > 0 ? 1 : -1);
@@ -149,7 +149,7 @@ class SurfaceMeshTest : public testing::Test {
       const Position at = next.back();
       next.pop_back();
       for (int direction = 0; direction < 6; ++direction) {
-        const Position to = neighbor_of(at, direction);
+        const Position to = next_cell(at, direction);
         const bool is_in = std::ranges::all_of(to, [&](int64_t c) { return c >= -1 && c <= edge; });
         if (is_in && !set.contains(to) && outside.insert(to).second) next.push_back(to);
       }
@@ -163,7 +163,7 @@ class SurfaceMeshTest : public testing::Test {
     std::set<Face> faces;
     for (const Position& cell : set)
       for (int direction = 0; direction < 6; ++direction)
-        if (region.contains(cell, 1) && is_empty(neighbor_of(cell, direction)))
+        if (region.contains(cell, 1) && is_empty(next_cell(cell, direction)))
           faces.insert({cell, direction});
     return faces;
   }
@@ -173,14 +173,14 @@ class SurfaceMeshTest : public testing::Test {
     request.options = options_;
     return request;
   }
-  DecodedMesh exported(uint32_t levels, const Region& region) {
+  SurfaceTriangles exported(uint32_t levels, const Region& region) {
     NoProgress progress;
     report_ = export_dag(system_files(), *file_, request(levels, region), progress, CancelToken{});
-    return decode_mesh(read_bytes(folder_.file("a.glb")), region.low);
+    return decode_surface(read_bytes(folder_.file("a.glb")), region.low);
   }
   // Checks that each edge of the mesh is used as often in one direction as in the other: once, or
   // twice if two cells have only this edge in common.
-  static void expect_closed(const DecodedMesh& mesh) {
+  static void expect_closed(const SurfaceTriangles& mesh) {
     std::map<std::pair<uint32_t, uint32_t>, int> edges;
     for (const auto& triangle : mesh.triangles)
       for (size_t i = 0; i < 3; ++i) ++edges[{triangle[i], triangle[(i + 1) % 3]}];
@@ -210,7 +210,7 @@ TEST_F(SurfaceMeshTest, AllFacesAreCoveredOnce) {
         if (levels < 5 && region == kPartOfMesh) continue;
         options_.watertight = watertight;
         const std::set<Position> set = cells(levels);
-        EXPECT_TRUE(faces_of(exported(levels, region)) ==
+        EXPECT_TRUE(covered_faces(exported(levels, region)) ==
                     expected(set, region, [&](const Position& next) {
                       return !set.contains(next) || !region.contains(next, 1);
                     }));
@@ -218,8 +218,8 @@ TEST_F(SurfaceMeshTest, AllFacesAreCoveredOnce) {
 }
 
 TEST_F(SurfaceMeshTest, VerticesAreShared) {
-  const DecodedMesh mesh = exported(5, whole_grid(5));
-  EXPECT_EQ(std::set<MeshPoint>(mesh.vertices.begin(), mesh.vertices.end()).size(),
+  const SurfaceTriangles mesh = exported(5, whole_grid(5));
+  EXPECT_EQ(std::set<SurfacePoint>(mesh.vertices.begin(), mesh.vertices.end()).size(),
             mesh.vertices.size());
   EXPECT_LT(2 * mesh.vertices.size(), 4 * mesh.triangles.size());
 }
@@ -243,7 +243,7 @@ TEST_F(SurfaceMeshTest, AnEdgeOfTwoVoxelsHasFourTriangles) {
   scene_.emplace(two);
   file_ = open_global_file(scene_->path());
   options_.watertight = true;
-  const DecodedMesh mesh = exported(2, whole_grid(2));
+  const SurfaceTriangles mesh = exported(2, whole_grid(2));
   std::map<std::pair<uint32_t, uint32_t>, int> edges;
   for (const auto& t : mesh.triangles)
     for (size_t i = 0; i < 3; ++i) ++edges[std::minmax(t[i], t[(i + 1) % 3])];
@@ -260,7 +260,7 @@ TEST_F(SurfaceMeshTest, OutsideHasTheFacesThatAFloodReaches) {
     const auto is_outside = [&](const Position& next) { return outside.contains(next); };
     for (const UpAxis up : {UpAxis::kY, UpAxis::kZ}) {
       options_.up = up;
-      const std::set<Face> seen = faces_of(exported(levels, whole_grid(levels)));
+      const std::set<Face> seen = covered_faces(exported(levels, whole_grid(levels)));
       EXPECT_EQ(report_.voxels, set.size());
       if (up == UpAxis::kZ)
         EXPECT_EQ(seen.size(), expected(set, whole_grid(levels), is_outside).size());
@@ -275,9 +275,9 @@ TEST_F(SurfaceMeshTest, OutsideOfARegionIsThatOfTheGrid) {
   options_.outside = true;
   const std::set<Position> set = cells(5), outside = flooded(set, 32);
   for (const Region& region : {kPartOfMesh, Region{{5, 5, 5}, {10, 10, 10}}})
-    EXPECT_TRUE(faces_of(exported(5, region)) == expected(set, region, [&](const Position& next) {
-                  return outside.contains(next);
-                }));
+    EXPECT_TRUE(
+        covered_faces(exported(5, region)) ==
+        expected(set, region, [&](const Position& next) { return outside.contains(next); }));
   EXPECT_EQ(report_.facts[1].second[0], 0) << "the inner box is not visible";
 }
 
@@ -292,7 +292,7 @@ TEST_F(SurfaceMeshTest, ChunksHaveTheOutsideOfTheGrid) {
   for (const auto& level : manifest["levels"]) {
     std::set<Face> found;
     for (const auto& chunk : level["chunks"])
-      found.merge(faces_of(decode_mesh(
+      found.merge(covered_faces(decode_surface(
           read_bytes(folder_.file("chunks") + "/" + chunk["files"][0]["path"].get<std::string>()),
           chunk["low"].get<Position>())));
     const auto levels = level["level"].get<uint32_t>();
@@ -307,9 +307,9 @@ TEST_F(SurfaceMeshTest, ChunksHaveTheOutsideOfTheGrid) {
 TEST_F(SurfaceMeshTest, LargeGridsHaveFloats) {
   write_corners(folder_.file("corners.vdag"), 18);
   file_ = open_global_file(folder_.file("corners.vdag"));
-  const DecodedMesh mesh = exported(18, whole_grid(18));
+  const SurfaceTriangles mesh = exported(18, whole_grid(18));
   ASSERT_EQ(mesh.vertices.size(), 16u);
-  for (const MeshPoint& point : mesh.vertices)
+  for (const SurfacePoint& point : mesh.vertices)
     for (const int64_t coordinate : point)
       EXPECT_TRUE(coordinate < 2 || coordinate > (1 << 18) - 2) << coordinate;
   EXPECT_EQ(read_bytes(folder_.file("a.glb")).find("KHR_"), std::string::npos);

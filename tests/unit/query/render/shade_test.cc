@@ -13,7 +13,7 @@
 namespace voxdag::query {
 namespace {
 
-SurfaceHit hit_of(uint32_t depth, int64_t x, int64_t y, int64_t z) {
+SurfaceHit shaded_hit(uint32_t depth, int64_t x, int64_t y, int64_t z) {
   SurfaceHit hit;
   hit.depth = depth;
   hit.cell[0] = x;
@@ -22,7 +22,7 @@ SurfaceHit hit_of(uint32_t depth, int64_t x, int64_t y, int64_t z) {
   hit.normal = {{0, 1, 0}};
   return hit;
 }
-double distance(const Vec& a, const Vec& b) { return length(a - b); }
+double color_distance(const Vec& a, const Vec& b) { return length(a - b); }
 
 // Seven of the eight lower bricks are equal. One brick is different.
 TEST(ShadeColors, SharingShowsHowOftenABrickOccurs) {
@@ -33,9 +33,10 @@ TEST(ShadeColors, SharingShowsHowOftenABrickOccurs) {
   const auto file = open_global_file(scene.path());
   const DagView dag(*file);
   const ShadeColors colors(dag, Shade::kSharing);
-  const Vec rare = colors.of(hit_of(4, 0, 0, 0)), frequent = colors.of(hit_of(4, 4, 4, 0));
-  EXPECT_EQ(distance(frequent, colors.of(hit_of(4, 0, 4, 0))), 0) << "the same brick";
-  EXPECT_EQ(distance(rare, colors.of(hit_of(1, 0, 0, 0))), 0) << "a node that occurs once";
+  const Vec rare = colors.of(shaded_hit(4, 0, 0, 0)), frequent = colors.of(shaded_hit(4, 4, 4, 0));
+  EXPECT_EQ(color_distance(frequent, colors.of(shaded_hit(4, 0, 4, 0))), 0) << "the same brick";
+  EXPECT_EQ(color_distance(rare, colors.of(shaded_hit(1, 0, 0, 0))), 0)
+      << "a node that occurs once";
   EXPECT_GT(frequent[1], rare[1] + 0.3);
   EXPECT_LT(rare[1], 0.05);
 }
@@ -48,7 +49,7 @@ TEST(ShadeColors, SharingIsLogarithmic) {
   const QueryFile scene(voxels);
   const auto file = open_global_file(scene.path());
   const DagView dag(*file);
-  const Vec middle = ShadeColors(dag, Shade::kSharing).of(hit_of(6, 4, 33, 0));
+  const Vec middle = ShadeColors(dag, Shade::kSharing).of(shaded_hit(6, 4, 33, 0));
   EXPECT_NEAR(middle[0], linear_of_srgb_value(0.13), 1e-9);
   EXPECT_NEAR(middle[1], linear_of_srgb_value(0.57), 1e-9);
 }
@@ -58,7 +59,8 @@ TEST(ShadeColors, NeighborLevelsDiffer) {
   const DagView dag = scene.view();
   const ShadeColors colors(dag, Shade::kLevel);
   for (uint32_t level = 0; level < 20; ++level)
-    EXPECT_GT(distance(colors.of(hit_of(level, 0, 0, 0)), colors.of(hit_of(level + 1, 0, 0, 0))),
+    EXPECT_GT(color_distance(colors.of(shaded_hit(level, 0, 0, 0)),
+                             colors.of(shaded_hit(level + 1, 0, 0, 0))),
               0.1);
 }
 
