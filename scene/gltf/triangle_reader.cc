@@ -109,7 +109,7 @@ void TriangleReader::for_each_instance(uint64_t first, uint64_t count, const Gri
     const uint64_t of_instance = of_draw % draw_.triangles;
     const uint64_t n = std::min(end - first, draw_.triangles - of_instance);
     instance_ = of_draw / draw_.triangles;
-    // The joints of a skin already place its vertices in world space.
+    // A skin's joint matrices already move the vertices to world space.
     world_ = binding_.skin >= 0 ? Transform{} : walk_->global();
     const Node& node = document_.nodes[static_cast<size_t>(draw_.node)];
     if (node.instancing.present) world_ = multiply(world_, instances_->at(instance_));

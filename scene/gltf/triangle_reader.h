@@ -34,12 +34,13 @@ class TriangleReader {
   TriangleReader(const Document& document, BufferReader& buffers, const ReaderOptions& options,
                  MemoryBudget& budget, const CancelToken& cancel);
 
-  // Visits the triangles of [first, first + count), numbered in the order in which the document
-  // declares them, in batches of up to 1024. The triangles are in world space, or snapped to `grid`
-  // if it is not null. An invalid triangle is dropped if `skip_invalid` is set; otherwise read()
-  // throws Error{kInvalidInput} with its node, mesh and primitive.
+  // Passes triangles [first, first + count) of the document's order to `visit`, in batches of up to
+  // 1024. They are in world space, or snapped to `grid` if it is not null. If `skip_invalid` is
+  // set, omits invalid triangles; otherwise throws Error{kInvalidInput} with an invalid triangle's
+  // node, mesh and primitive.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
-  // Visits the same triangles in world space with their surfaces, in batches of the same size.
+  // Passes triangles [first, first + count) in world space, with their surfaces, to `visit`, in
+  // batches of up to 1024.
   void read_surfaces(uint64_t first, uint64_t count, const SurfaceVisitor& visit);
   // Returns the bounds of triangles [first, first + count) in world space.
   WorldBounds read_bounds(uint64_t first, uint64_t count);
@@ -50,7 +51,7 @@ class TriangleReader {
 
   // All instances of a primitive drawn by a node.
   struct Draw {
-    uint64_t first = 0, end = 0;  // range of its triangle numbers
+    uint64_t first = 0, end = 0;  // the triangles [first, end) of the document
     int node = -1;
     size_t primitive = 0;
     uint64_t triangles = 0;  // triangles per instance

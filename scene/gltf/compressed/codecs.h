@@ -1,5 +1,5 @@
 // The two decoders of compressed geometry. If voxdag was built without a decoder's library,
-// documents that need it are refused before anything is decoded.
+// check_compressed() refuses documents that need this decoder before anything is decoded.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace voxdag::gltf {
 
-// Data that violate their format. The message does not name the file.
+// Thrown for compressed data that violate their format. The message does not name the file.
 struct BrokenData {
   std::string message;
 };

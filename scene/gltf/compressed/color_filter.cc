@@ -19,8 +19,8 @@ void decode(std::span<std::byte> elements) {
     T in[4], out[4];
     std::memcpy(in, elements.data(), sizeof in);
     const int y = in[0], co = static_cast<Signed>(in[1]), cg = static_cast<Signed>(in[2]);
-    // The highest set bit of alpha is not part of its value. It marks how many bits a component
-    // has.
+    // The highest set bit of in[3] is not part of alpha. The position of this bit gives the number
+    // of bits per component.
     const int largest = (1 << std::bit_width(in[3])) - 1;
     const int alpha = in[3] & largest >> 1;
     const int rgba[4] = {y + co - cg, y + cg, y - co - cg, alpha << 1 | (alpha & 1)};

@@ -55,8 +55,8 @@ void DecodedBuffers::read(int index, uint64_t offset, std::span<std::byte> out,
   reader_->read_at(decoded.begin + offset, out);
 }
 
-// Decodes the buffer. If it does not fit in memory while other threads decode, decodes it again
-// while no other thread decodes.
+// Decodes the buffer. If this fails because memory is short while other threads decode, decodes the
+// buffer again while no other thread decodes.
 void DecodedBuffers::decode_within_budget(const BufferSource& buffer, uint64_t begin,
                                           const ReadFile& read_file) {
   const std::string where = document_.path + ": " + name_of(buffer) + ": ";

@@ -1,6 +1,6 @@
 // The decoded contents of a document's compressed buffers. The first reader that needs a buffer
-// decodes it into a temporary file without a name; windows are then read from this file. Memory
-// holds one primitive or view per reader during decoding, and nothing afterwards. Thread-safe.
+// decodes it into a temporary file without a name; all readers then read ranges of this file. While
+// a reader decodes, it holds one Draco primitive or one buffer view in memory. Thread-safe.
 #pragma once
 
 #include <atomic>
@@ -32,8 +32,8 @@ class DecodedBuffers {
                  MemoryBudget& budget);
 
   // Reads bytes [offset, offset + out.size()) of the decoded contents of buffer `buffer`, which
-  // must contain them. Throws Error{kInvalidInput} for compressed data that do not decode to these
-  // bytes, {kOutOfMemory} if decoding does not fit the budget, and {kNoSpace} if the result does
+  // must contain them. Throws Error{kInvalidInput} if the compressed data are damaged,
+  // {kOutOfMemory} if decoding does not fit the budget, and {kNoSpace} if the decoded bytes do
   // not fit the disk.
   void read(int buffer, uint64_t offset, std::span<std::byte> out, const ReadFile& read_file);
 

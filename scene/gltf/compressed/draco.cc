@@ -103,7 +103,7 @@ class BoundedDecoder : public Decoder {
   }
 
   // Charges the memory for the objects of all attributes. Draco makes these objects before it calls
-  // DecodeAllAttributes(), so they must be charged earlier.
+  // DecodeAllAttributes(), so the charge cannot wait until then.
   void charge_attributes() {
     const uint64_t attributes = count_attributes(attributes_, *this);
     charge_more(charge_, attributes * kBytesPerAttribute);
@@ -123,14 +123,14 @@ class BoundedDecoder : public Decoder {
                           sizeof(int32_t) * static_cast<uint64_t>(a.num_components());
     }
     charge_more(charge_, mesh.num_points() * bytes_per_vertex);
-    // The charge above bounds the number of values that this check has to read.
+    // The charge above fits the budget, so the number of values that this check reads is bounded.
     check_attribute_tables(attributes_, *this, admit_table_);
   }
 
   const DracoHeader& header_;
   const uint64_t vertices_;
   MemoryCharge& charge_;
-  uint64_t table_bytes_ = 0;  // charge for the largest table
+  uint64_t table_bytes_ = 0;  // bytes charged for the largest table so far
   const AdmitTable admit_table_ = [this](uint64_t bytes) {
     if (bytes <= table_bytes_) return;
     charge_more(charge_, bytes - table_bytes_);
@@ -144,8 +144,8 @@ void decode_as(const DracoHeader& header, std::span<const std::byte> data, Memor
                uint64_t max_vertices, draco::Mesh& mesh) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
-  // Quantized values remain integers. write_dequantized() computes the positions with operations
-  // that give the same result on every machine.
+  // Makes Draco leave quantized values as integers, because write_dequantized() converts them with
+  // operations that give the same result on every machine.
   draco::DecoderOptions options;
   for (const auto type : {draco::GeometryAttribute::POSITION, draco::GeometryAttribute::GENERIC})
     options.SetAttributeBool(type, "skip_attribute_transform", true);

@@ -8,7 +8,7 @@
 namespace voxdag::gltf {
 namespace {
 
-// "DRACO", u8 major and minor version, u8 geometry type, u8 method, u16 flags.
+// The header: "DRACO", u8 major version, u8 minor version, u8 geometry type, u8 method, u16 flags.
 constexpr size_t kDracoHeaderBytes = 11;
 constexpr uint8_t kMesh = 1;
 constexpr uint8_t kSequential = 0, kEdgebreaker = 1;
@@ -28,7 +28,7 @@ class Bytes {
     if (count > data_.size() - at_) refuse_short();
     at_ += static_cast<size_t>(count);
   }
-  // Reads seven bits per byte, the lowest first; the last byte is below 128.
+  // Reads an integer of seven bits per byte, lowest bits first. Only the last byte is below 128.
   uint32_t varint() {
     uint64_t value = 0;
     for (unsigned shift = 0; shift < 35; shift += 7) {

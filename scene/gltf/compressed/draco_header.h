@@ -18,12 +18,14 @@ struct DracoHeader {
   // Number of attributes that have their own connectivity table. An attribute needs one if corners
   // with the same position can have different values of it. Edgebreaker only.
   uint64_t attribute_tables = 0;
-  // Offset at which the header begins. If there are metadata, read_draco_header() overwrites their
-  // end with a copy of the header.
+  // Offset at which Draco's decoder must begin: 0 if the data have no metadata. Otherwise
+  // read_draco_header() has overwritten the last bytes of the metadata with a copy of the header,
+  // and `begin` is the offset of this copy.
   size_t begin = 0;
 };
 
-// Reads the header, and removes metadata, which does not affect vertices. Throws BrokenData.
+// Reads the header. Removes the metadata from `data` (see `begin`), because voxdag does not use it.
+// Throws BrokenData.
 DracoHeader read_draco_header(std::span<std::byte> data);
 
 }  // namespace voxdag::gltf

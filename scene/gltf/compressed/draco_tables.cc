@@ -94,9 +94,9 @@ class Walker {
     ((bits == kBits + 1 ? static_cast<void>(open_symbols<kBits + 1>()) : void()), ...);
   }
 
-  // Skips entries that store the size of their numbers: one coded symbol per entry gives the bits
-  // of each of its numbers, and the bits of all numbers follow. Draco accepts data that end before
-  // the last bit, so this function accepts them as well.
+  // Skips entries that store the size of their numbers. First come the coded symbols, one for each
+  // entry: the size in bits of each of the entry's numbers. Then come the bits of all numbers.
+  // Draco accepts data that end before the last bit, so this function accepts them as well.
   void skip_tagged(uint64_t entries, uint64_t components) {
     auto tags = open_symbols<kTagBits>();
     uint64_t bits = 0;
@@ -263,7 +263,7 @@ void check_valence_tables(const draco::DecoderBuffer& at, const AdmitTable& admi
     walker.varint();
   }
   walker.skip((uint64_t{splits} + 7) / 8);
-  for (int i = 0; i < 1 + attributes; ++i) walker.skip_bits();  // first faces, edges of attributes
+  for (int i = 0; i < 1 + attributes; ++i) walker.skip_bits();  // first faces, attribute edges
   for (int i = 0; i < kValenceContexts; ++i) {
     const uint32_t symbols = walker.varint();
     if (symbols > faces) refuse_damaged();

@@ -2,9 +2,9 @@
 //
 // The decoder allocates 12 bytes per symbol of an alphabet, and up to 4 MiB in addition. One byte
 // of compressed data can declare 64 symbols, so a file of 1 MiB can request 768 MiB in the middle
-// of the decoding, and no header states it. The functions below follow the data as Draco 1.5 reads
-// them (bitstream 2.2), with Draco's public classes, and skip all data except the tables. They
-// throw BrokenData for data that Draco would refuse.
+// of the decoding, without a header that states this size. The functions below go through the data
+// as Draco 1.5 does (bitstream 2.2), with Draco's public classes, but skip all data except the
+// tables. They throw BrokenData for data that Draco would refuse.
 #pragma once
 
 #include <cstdint>

@@ -49,7 +49,7 @@ class Input {
   bool failed_ = false;
 };
 
-// Reads 16 deltas of `bits` bits. A delta whose bits are all 1 follows as a byte.
+// Reads 16 deltas of `bits` bits. If all bits of a delta are 1, its value follows as a byte.
 void read_group(Input& in, unsigned bits, uint8_t* deltas) {
   if (bits == 0) return void(std::fill_n(deltas, kGroup, uint8_t{0}));
   if (bits == 8) return in.read(deltas, kGroup);
@@ -85,8 +85,8 @@ T without_zigzag(T value) {
   return static_cast<T>(value & 1 ? ~(value >> 1) : value >> 1);
 }
 
-// Applies the deltas of one channel. `element` has the channel's bytes in the previous element, and
-// receives its bytes in the current element.
+// Applies the deltas of one channel, which has four bytes of each element. `element`: the channel's
+// bytes in the previous element, which add_deltas() changes to its bytes in the current element.
 void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* element) {
   const auto pair = [](const uint8_t* bytes) {
     return static_cast<uint16_t>(bytes[0] | bytes[1] << 8);

@@ -1,4 +1,4 @@
-// Checks that need the complete document.
+// Checks of references between elements of a document, made after all elements have been read.
 #pragma once
 
 #include <cstdint>

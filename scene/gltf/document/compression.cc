@@ -81,9 +81,9 @@ const Accessor& at(const Document& d, int accessor) {
   return d.accessors[static_cast<size_t>(accessor)];
 }
 
-// Adds a copy of accessor `accessor`, and sets `accessor` to the index of the copy. Its `count`
-// elements are packed and begin at `offset` of buffer `buffer`. Returns the number of bytes
-// of all its elements.
+// Adds a copy of accessor `accessor`, and sets `accessor` to the index of the copy. The copy's
+// `count` elements are packed and begin at byte `offset` of buffer `buffer`. Returns the number of
+// bytes of these elements.
 uint64_t move_accessor(Document& d, int& accessor, uint64_t count, int buffer, uint64_t offset) {
   Accessor copy = at(d, accessor);
   copy.count = count;
@@ -102,8 +102,8 @@ uint64_t move_accessor(Document& d, int& accessor, uint64_t count, int buffer, u
   return bytes;
 }
 
-// An attribute in Draco data: its id there, and the accessor of the primitive whose data it
-// replaces.
+// An attribute that Draco data contain: its id in these data, the primitive's accessor that must be
+// changed to refer to the decoded values, and the attribute's name for messages.
 struct Replaced {
   int id;
   int* accessor;
@@ -260,7 +260,7 @@ void place_draco_primitive(Document& d, Primitive& primitive, const std::string&
   const std::string what = where + ": KHR_draco_mesh_compression";
   const bool has_indices = primitive.indices >= 0;
   if (!exists(d, primitive.position) || (has_indices && !exists(d, primitive.indices)))
-    return;  // refused later, like in any primitive
+    return;  // a missing accessor is refused later, as in any primitive
   const bool has_fallback =
       at(d, primitive.position).view >= 0 && (!has_indices || at(d, primitive.indices).view >= 0);
   if (has_fallback) return;

@@ -1,8 +1,8 @@
 // Compressed geometry: EXT_meshopt_compression and KHR_meshopt_compression compress buffer views,
-// KHR_draco_mesh_compression compresses primitives. Each becomes an additional buffer of the
-// document, and all other code reads this buffer like stored bytes. If a file also stores the
-// geometry uncompressed (a fallback), the fallback is read. So the result does not depend on the
-// libraries that voxdag was built with.
+// KHR_draco_mesh_compression compresses primitives. The document gets an additional buffer for the
+// decoded bytes of each, and all other code reads this buffer like stored bytes. If a file also has
+// the uncompressed geometry (a fallback), the fallback is read. So the result does not depend on
+// the libraries that voxdag was built with.
 #pragma once
 
 #include <cstdint>
@@ -57,9 +57,9 @@ struct DracoExtension {
   std::vector<JointSet> joint_sets;
 };
 
-// The decoded form of a Draco primitive: `corners` indices of 32 bits, then the attributes one
-// after another, each packed. Attributes that do not affect positions form a second part without
-// indices, so that reading only geometry does not decode them.
+// The decoded form of a Draco primitive: `corners` indices of 32 bits, then the values of each
+// attribute, packed. The attributes of the surface (colors, texture coordinates) form a second part
+// without indices, so that reading only geometry does not decode them.
 struct DracoPart {
   struct Attribute {
     int id = -1;  // id in the Draco data
@@ -83,27 +83,28 @@ struct DracoPart {
 // name. Returns nullopt if `extensions` has none.
 std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions);
 
-// Read the extension of a buffer view, whose extensions are `extensions`, and the extension of a
-// primitive. read_meshopt() returns null if the view has no meshopt extension. Both throw Violation
-// for a member that is missing or of a wrong type, or for a layout that the extension does not
-// allow.
+// read_meshopt() reads the meshopt extension of a buffer view from the view's `extensions`; null if
+// they have no such extension. read_draco() reads the Draco extension of a primitive. Both throw
+// Violation for a member that is missing or of a wrong type, or for a layout that the extension
+// does not allow.
 std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extensions);
 std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
 
 uint64_t heap_bytes(const DracoExtension& draco);
 
-// Adds a buffer for every compressed view without uncompressed bytes, and points the view at it.
+// For each meshopt-compressed view without a fallback, adds a buffer to which the view then refers.
 void place_meshopt_views(Document& document);
-// Adds buffers of decoded bytes for a compressed primitive. The primitive's accessors become copies
-// that point at these buffers. Call it before the accessors are checked. Throws
-// Error{kInvalidInput}.
+// Adds a buffer for the decoded indices, positions, joints and weights of a compressed primitive.
+// Replaces the primitive's accessors by copies that refer to this buffer. Call it before the
+// accessors are checked. Throws Error{kInvalidInput}.
 void place_draco_primitive(Document& document, Primitive& primitive, const std::string& where);
-// Adds a buffer for the accessors of the primitive's surface, if place_draco_primitive() placed its
-// positions. `set` is the n of the surface's TEXCOORD_n, if it has one.
+// If place_draco_primitive() added a buffer for this primitive, adds another one for the decoded
+// texture coordinates and colors of its PrimitiveSurface, and replaces these accessors likewise.
+// `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
-// Checks a view of a buffer that one of the functions above added. `where` names the view. Throws
-// Error{kInvalidInput} if its compressed bytes do not exist or decode to another layout, or if
-// voxdag was built without the library that decodes them.
+// Checks a view whose buffer one of the functions above added. `where` names the view. Throws
+// Error{kInvalidInput} if the compressed bytes do not exist, if the view does not fit the decoded
+// bytes, or if voxdag was built without the library that decodes them.
 void check_compressed(const Document& document, const BufferView& view, const std::string& where);
 
 }  // namespace voxdag::gltf

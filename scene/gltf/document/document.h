@@ -1,9 +1,9 @@
 // A glTF 2.0 file without its geometry. Arrays that can have an element per node or mesh of a large
-// scene are compact structs, each charged to the memory budget. Asset, extensions, materials,
-// textures, samplers and images are in tinygltf's model. read_document() fills a document and
+// scene consist of compact structs, each charged to the memory budget. Materials, textures,
+// samplers and images are in tinygltf's model. read_document() fills a document, and
 // check_document() checks it once. After that:
-//   1. every index in nodes of the scene and in drawn meshes is in range, or -1 if the file gives
-//      none;
+//   1. every index in nodes of the scene and in drawn meshes is in range, or -1 if the file has no
+//      index there;
 //   2. every accessor that is read has the type its use requires. Its bytes are inside its buffer
 //      view, the view is inside its buffer, and the buffer is inside the existing bytes;
 //   3. the nodes below `roots` form trees, and no root is below another one.
@@ -181,7 +181,7 @@ struct Document {
   std::deque<std::string> extensions_used;
   std::deque<std::string> extensions_required;
   // Materials, textures, samplers and images, as read by tinygltf. The model's other arrays are
-  // empty. No image is loaded: a data: URI ends at its comma.
+  // empty. The model has no image data: a data: URI in it ends at the comma.
   std::shared_ptr<tinygltf::Model> model;
   std::vector<RawString> image_uris;  // one per image of the model; size 0 for an image without uri
   WarningList material_warnings;      // about members of `model`; not in `warnings`
@@ -200,7 +200,7 @@ struct Document {
   std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
   int scene = -1;                                      // the default scene; -1: none
   std::vector<int> roots;                // roots of the scene to draw; set by check_document()
-  std::map<int, Transform> above_roots;  // global transforms of the parents of roots that have one
+  std::map<int, Transform> above_roots;  // for a root with a parent: the parent's global transform
   // Messages about buffers, bufferViews, accessors, meshes and skins that break a rule of glTF, by
   // section and index. check_usable() throws the message.
   std::map<std::pair<std::string, int>, std::string> broken;

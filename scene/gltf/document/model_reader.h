@@ -20,9 +20,9 @@ class ModelReader {
   ModelReader(const std::string& scene_path, MemoryBudget& budget);
 
   // Each function adds an element: add_image() to the images, the others to the JSON text that
-  // parse() passes to tinygltf. They omit broken members, and add a warning for each of them to the
-  // warnings that parse() sets. They throw Error{kOutOfMemory} if the model would not fit in the
-  // budget.
+  // parse() passes to tinygltf. The functions omit members that break a rule of glTF, with a
+  // warning in Document::material_warnings for each. They throw Error{kOutOfMemory} if the model
+  // would not fit in the budget.
   void add_material(const ElementText& element);
   void add_texture(const ElementText& element);
   void add_sampler(const ElementText& element);

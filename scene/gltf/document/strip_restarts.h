@@ -7,7 +7,7 @@
 
 namespace voxdag::gltf {
 
-// Follows the indices of a strip or fan from one index to the next.
+// Takes the indices of a strip or fan one by one, and finds the triangles that they complete.
 class StripWalk {
  public:
   StripWalk(bool is_fan, uint32_t restart) : is_fan_(is_fan), restart_(restart) {}

@@ -7,8 +7,8 @@ namespace voxdag::gltf {
 
 enum class ExtensionSupport {
   kRead,      // voxdag reads it
-  kHarmless,  // it does not move vertices, so the voxels are right without it
-  kUnknown    // the voxels may be wrong without it
+  kHarmless,  // it does not move vertices, so voxdag can ignore it
+  kUnknown    // it may move vertices, so the voxels may be wrong if it is ignored
 };
 
 struct ExtensionInfo {

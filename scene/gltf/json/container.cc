@@ -76,7 +76,7 @@ uint64_t next_chunk(const ReadableFile& file, uint64_t end_of_chunk, uint64_t en
   return !is_bin(end_of_chunk) && is_bin(aligned) ? aligned : end_of_chunk;
 }
 
-// True if the bytes from `offset` are too few for a chunk, and all zero or blank.
+// True if the bytes from `offset` to `end` are too few for a chunk, and all zero or blank.
 bool is_padding(const ReadableFile& file, uint64_t offset, uint64_t end) {
   if (end - offset >= kChunkHeaderBytes) return false;
   std::array<std::byte, kChunkHeaderBytes> bytes{};

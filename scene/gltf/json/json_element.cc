@@ -43,7 +43,7 @@ std::optional<uint64_t> JsonElement::whole_number() const {
   constexpr double kExact = 0x1p53;
   if (value_.is_number_unsigned()) return value_.get<uint64_t>();
   if (!value_.is_number()) return {};
-  const double number = value_.get<double>();  // "-0" is a signed integer
+  const double number = value_.get<double>();  // also for "-0", which the parser reads as signed
   if (!(number >= 0 && number <= kExact) || number != std::floor(number)) return {};
   return static_cast<uint64_t>(number);
 }

@@ -224,7 +224,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
 
   uint64_t depth_ = 0;  // open objects and arrays of the element that contain the next value
   Json element_;
-  std::vector<Json*> open_;   // these objects and arrays within element_
+  std::vector<Json*> open_;   // the depth_ open objects and arrays within element_
   ElementTextWriter writer_;  // used instead of element_ if the section is read as text
   uint64_t element_bytes_ = 0;
   RawString uri_;

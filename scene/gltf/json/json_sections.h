@@ -19,7 +19,7 @@ namespace voxdag::gltf {
 struct JsonSection {
   std::string name;
   bool is_array;    // each element is read separately; otherwise the section is one element
-  bool is_checked;  // a Violation in it is returned; if false, it is passed to `ignore`
+  bool is_checked;  // read_sections() returns its first Violation; if false, ignores its Violations
   // Receives each element as a value or as text. May throw Violation. The argument is valid during
   // the call.
   std::variant<std::function<void(const JsonElement&)>, std::function<void(const ElementText&)>>
@@ -31,7 +31,7 @@ struct JsonSection {
 // Passes the elements of `sections` to their readers in the order of the file. Returns the message
 // of the first Violation in a checked section, or "". Passes the messages of Violations in other
 // sections to `ignore`. Continues to read after a Violation, because the file's glTF version may
-// follow. If the version is unsupported, the caller reports this instead of the Violation. Throws
+// follow. If the version is unsupported, the caller reports the version, not the Violation. Throws
 // Error{kInvalidInput} for a text that is not JSON, Error{kOutOfMemory} for an element that does
 // not fit the budget.
 std::string read_sections(const ReadableFile& file, FileRange json,

@@ -166,7 +166,7 @@ size_t JsonWindow::non_finite_length() const {
 }
 
 // True if the parser does not receive the character. Escapes and multi-byte characters always reach
-// the parser, because it would refuse a part of them.
+// the parser, because it would refuse an incomplete one.
 bool JsonWindow::is_withheld(char c) {
   if (!in_string_) return is_second_blank_;
   if (string_.characters.size <= kMaxShownCharacters || in_escape_ || !is_plain(c)) return false;

@@ -4,7 +4,7 @@
 // Strings can be long: a data: URI of geometry or of an image may be most of the file. The parser
 // would collect them in memory. So the window withholds the plain characters of a string past the
 // first few thousand, and records the string's position in the file. The readers of buffers and
-// images later decode the string from there, in windows. If there are several blanks between two
+// images later decode the string from there, piece by piece. If several blanks are between two
 // values, the parser receives one. NaN and infinities, which some programs write although JSON has
 // no such numbers, reach the parser as null. A number with more digits than any value needs is
 // refused. The memory for the characters that the parser collects is charged to the budget. Not
@@ -45,10 +45,10 @@ class JsonWindow : public std::streambuf {
   void track_outside_strings(char c);
   void track_in_string(char c);
   bool is_withheld(char c);
-  // Returns the length of NaN or an infinity that begins with the last character; 0 if none does.
+  // Returns the length of a NaN or infinity whose first character was just read; 0 for other text.
   size_t non_finite_length() const;
-  // Returns the next characters of the file, beginning with the last character that was read. They
-  // may be copied to `space`.
+  // Returns the next characters of the file, beginning with the last character that was read.
+  // Copies them to `space` if they extend beyond the window.
   std::string_view peek(std::span<char, kPeekCharacters> space) const;
 
   const ReadableFile& file_;
@@ -64,7 +64,7 @@ class JsonWindow : public std::streambuf {
   int hex_digits_left_ = 0;       // remaining digits of an escape \uXXXX
   bool in_escape_ = false;        // the last character is part of an escape
   bool after_blank_ = false;      // the last character outside of strings is blank
-  bool is_second_blank_ = false;  // the last two such characters are blank
+  bool is_second_blank_ = false;  // the last two characters outside of strings are blank
   uint64_t word_ = 0;             // characters of the number or literal so far
   std::string_view replacement_;  // characters that the parser receives next
   // Characters passed to the parser for the current string or number.

@@ -109,8 +109,8 @@ class MaterialResolver {
     return document_.accessors[static_cast<size_t>(index)];
   }
 
-  // Returns the types that the color accessor `index` may have. It may have three or four
-  // components. The accessor may not exist.
+  // Returns the types that the color accessor `index` may have. Three and four components are
+  // allowed. `index` may be out of range.
   AccessorUse color_use(int index) const {
     const bool exists = index >= 0 && static_cast<size_t>(index) < document_.accessors.size();
     return {where_ + ": COLOR_0",

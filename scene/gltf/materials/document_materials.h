@@ -14,9 +14,10 @@ namespace voxdag::gltf {
 
 struct DocumentMaterials {
   // The file's materials in the file's order, then additional materials in the order of their first
-  // use. These are one white material for primitives without a material, and copies of materials
-  // without their image for primitives without texture coordinates. Material::image is an index
-  // into `images`.
+  // use. There are two kinds of additional materials. Primitives that have no material share one
+  // white material. If a primitive has no texture coordinates but its material has an image, the
+  // primitive uses a copy of the material from which the image is removed. Material::image is an
+  // index into `images`.
   std::vector<Material> materials;
   std::vector<TextureTransform> transforms;  // transform of each material's texture coordinates
   std::vector<int> images;                   // indices of used images in the model

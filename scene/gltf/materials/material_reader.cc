@@ -59,7 +59,8 @@ TextureUse read_use(const tinygltf::TextureInfo& info) {
   return use;
 }
 
-// Reads a reference inside an extension.
+// Reads a texture reference (glTF textureInfo) that is a member of a material extension, given as
+// JSON because tinygltf does not parse extensions.
 TextureUse read_use(const tinygltf::Value& info) {
   TextureUse use{whole_number_or(info, "index", -1), whole_number_or(info, "texCoord", 0), {}};
   if (info.Has("extensions") && info.Get("extensions").Has("KHR_texture_transform"))
@@ -77,9 +78,9 @@ bool exists(const std::vector<T>& all, int index) {
   return index >= 0 && static_cast<size_t>(index) < all.size();
 }
 
-// Returns the index of the texture's image. If the model has no such image, returns the index in
-// the first of four extensions for other file formats. The returned index may not exist in the
-// model either.
+// Returns the index of the texture's image. If the model has no image with this index, returns the
+// index in the first extension (for another image format) whose image exists. If none exists,
+// returns the last index that was found, which is not in the model.
 int image_of(const tinygltf::Model& model, const tinygltf::Texture& texture) {
   int image = texture.source;
   for (const char* name :
@@ -149,8 +150,9 @@ bool is_black(const std::array<double, N>& factor) {
                      [](double c) { return intensity_of(c) == 0; });
 }
 
-// Replaces a black base color by the emitted light. The alpha of MASK and BLEND is in the base
-// color texture, so for these modes both textures must be the same.
+// Replaces a black base color by the emitted light. The alpha modes MASK and BLEND take alpha from
+// the base color texture. So for these modes, nothing is replaced if the textures of the base color
+// and of the emitted light differ.
 void use_emission(const tinygltf::Material& in, std::array<double, 4>& factor, TextureUse& use,
                   MaterialSource& out) {
   const Emission emission = read_emission(in);
@@ -185,7 +187,8 @@ MaterialSource read_material(const tinygltf::Model& model, int index) {
     use = read_use(in.pbrMetallicRoughness.baseColorTexture);
   }
   use_emission(in, factor, use, out);
-  // No alpha reaches a cutoff above 1, so everything is hidden. An intensity cannot be above 1.
+  // No alpha reaches a cutoff above 1, so everything is hidden. alpha_cutoff cannot be above 1, so
+  // alpha becomes 0 instead.
   if (out.material.alpha_mode == AlphaMode::kMask && in.alphaCutoff > 1) factor[3] = 0;
   for (size_t c = 0; c < factor.size(); ++c) out.material.factor[c] = intensity_of(factor[c]);
   read_texture(model, use, out.only_emits ? "emissive" : "base color", out);

@@ -19,9 +19,9 @@ class SurfaceReader {
   // the memory budget.
   static constexpr uint64_t kShareOfFree = 8;
 
-  // Makes one of `readers` readers that divide 1/kShareOfFree of the free bytes equally. It has
-  // space for `vertices` vertices, or for fewer if its part of the share is smaller. The document's
-  // materials must be resolved. `document` and `buffers` must outlive the reader.
+  // Makes one of `readers` readers that divide 1/kShareOfFree of the free bytes equally. Its cache
+  // has space for `vertices` vertices, or for fewer if its part of these bytes is too small. Call
+  // resolve_materials() first. `document` and `buffers` must outlive the reader.
   SurfaceReader(const Document& document, BufferReader& buffers, uint64_t vertices,
                 unsigned readers);
 

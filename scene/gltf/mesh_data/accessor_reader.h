@@ -1,4 +1,4 @@
-// Decodes the elements of one accessor in windows. The elements can be interleaved or packed,
+// Decodes ranges of the elements of one accessor. The elements can be interleaved or packed,
 // normalized integers or not, and have sparse replacements. Every 1024th index of a sparse accessor
 // is kept in memory, to find the replacements of a range. Not thread-safe.
 #pragma once

@@ -1,5 +1,5 @@
-// Reads the bytes of a scene's buffers in windows: from the scene file, from an external file, from
-// base64 characters, or from decoded geometry. Not thread-safe.
+// Reads the bytes of a scene's buffers, in windows of up to kWindowBytes: from the scene file, from
+// an external file, from base64 characters, or from decoded geometry. Not thread-safe.
 #pragma once
 
 #include <cstddef>

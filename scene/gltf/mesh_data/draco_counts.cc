@@ -62,9 +62,9 @@ bool fits_strip(const DracoPart& part, uint64_t faces) {
 }
 
 // Returns the part with the numbers of corners and vertices in its Draco data. If the header
-// contradicts part.vertices, decodes the faces to count the vertices. If the header neither
-// confirms nor contradicts it, does so only if there are at most `checked_faces` faces, and then
-// subtracts them from `checked_faces`.
+// contradicts part.vertices, decodes the faces to count the vertices. Does the same if the header
+// neither confirms nor contradicts part.vertices, but only for at most `checked_faces` faces, and
+// subtracts their number from `checked_faces`.
 DracoPart correct(const DracoPart& part, BufferReader& buffers, uint64_t& checked_faces) {
   DracoPart out = part;
   buffers.check_length(part.from.buffer);

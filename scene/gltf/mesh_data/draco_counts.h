@@ -7,11 +7,10 @@
 
 namespace voxdag::gltf {
 
-// Compares the counts of all decoded Draco primitives with the headers of their data. If they
-// differ, replaces the primitive's counts, with a warning. Data that cannot be read are left for
-// the decoder, which names the problem. Call it before the surfaces of the primitives are placed.
-// Throws Error{kInvalidInput} if morph targets or joints then have a count that differs from
-// the positions' count.
+// Compares the counts of all Draco primitives that have no fallback with the headers of their data.
+// If they differ, replaces the primitive's counts, with a warning. Skips data that cannot be read:
+// the decoder will report them. Call it before place_draco_surface(). Throws Error{kInvalidInput}
+// if a morph target or a joint set then has another number of elements than the positions.
 void correct_draco_counts(Document& document, BufferReader& buffers);
 
 }  // namespace voxdag::gltf

@@ -1,5 +1,5 @@
-// Reads the transforms of a node's instances (EXT_mesh_gpu_instancing) in windows. A node without
-// the extension has one identity transform. Not thread-safe.
+// Reads the transforms of a node's instances (EXT_mesh_gpu_instancing), in windows of consecutive
+// instances. A node without the extension has one identity transform. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,8 @@ class InstanceReader {
 
   uint64_t count() const { return count_; }
   // Returns the transform of an instance relative to the node: it scales first, then rotates, then
-  // translates. Fast if called in the order of the instances.
+  // translates. Reads a window of instances if the last window does not contain this one, so
+  // calls in the order of the instances are fast.
   Transform at(uint64_t instance);
 
  private:

@@ -138,8 +138,8 @@ void VertexSource::add(uint32_t joint, double weight, Transform& sum) const {
                                    : std::numeric_limits<double>::quiet_NaN();
 }
 
-// Divides the sum by the weights. If the weights add up to 0, the first joint of the vertex moves
-// it.
+// Divides the sum of matrices by the sum of weights. If the weights add up to 0, the matrix of the
+// vertex's first joint becomes the sum.
 void VertexSource::normalize(Blend& blend) const {
   if (blend.weights == 0) {
     blend.sum = Blend{}.sum;

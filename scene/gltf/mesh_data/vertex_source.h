@@ -38,7 +38,7 @@ class VertexSource : public PositionSource {
   uint64_t count() const override { return positions_.count(); }
 
   // Reads the positions of vertices [first, first + count), three doubles each. A vertex with a
-  // joint that does not exist becomes NaN. So it is refused only if a triangle uses it.
+  // joint that does not exist becomes NaN, so that it is refused only if a triangle uses it.
   void read(uint64_t first, size_t count, double* out) override;
 
  private:

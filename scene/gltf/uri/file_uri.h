@@ -16,8 +16,8 @@ namespace voxdag::gltf {
 // Error{kInvalidInput}, beginning with `where`, for a uri that is empty, absolute or has a scheme.
 std::vector<std::string> candidate_paths(const std::string& uri, const std::string& where);
 
-// Opens the first of these files that can be opened. If none can, throws the error for the
-// first path. The file may be a Git LFS pointer; the caller checks this.
+// Opens the first of the candidate_paths() that can be opened. If none can, throws the error for
+// the first path. The file may be a Git LFS pointer; the caller checks this.
 std::unique_ptr<ReadableFile> open_uri(FileSystem& files, const std::string& scene_path,
                                        const std::string& uri, const std::string& where);
 
