@@ -13,15 +13,16 @@ namespace voxdag {
 // invalid option, or Error{kDevice} for a backend whose device is missing.
 BuildSpec checked(const BuildSpec& spec);
 
-// Returns the spec with a resolution. If it has a voxel size but no resolution, scans the scene for
-// its extent and chooses the smallest resolution that fits. Throws as checked() does.
+// If `spec` has a voxel size but no resolution, scans the scene for its extent, and returns `spec`
+// with the smallest resolution whose grid contains the scene. Otherwise returns `spec` unchanged.
+// Throws as checked() does.
 BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context);
 
 // Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
-// because the build would overwrite or remove that file. Files that only the scene names, such as
-// its buffers, are checked in two cases. First, the work folder has files but no job store, so no
-// earlier build has checked them. Second, one of `outputs` begins with a zero byte, so it may be a
-// file of voxdag or any other file.
+// because the build would overwrite or remove that file. Always checks the files in `spec`. Checks
+// the files that these files name, such as buffers, in two cases. First, the work folder has files
+// but no job store, so no earlier build has checked the scene. Second, one of `outputs` begins with
+// a zero byte, so it may be a file of voxdag or any other file.
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
 

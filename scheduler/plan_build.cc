@@ -23,8 +23,8 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   BuildScene source(full.geometry, folder, budget, context);
   refuse_own_files(full, source, folder, {}, context);
   WorkFolder work(context, folder, full.run.lock_wait_s);
-  // Removes the temporary folder, or the spilled triangles in the user's work folder. The job store
-  // in the user's folder is left unchanged.
+  // Removes the work folder if it is temporary. In a work folder that the user has chosen, removes
+  // only the spilled triangles, and keeps the job store.
   struct Cleanup {
     WorkFolder& work;
     const bool own_folder;

@@ -18,7 +18,7 @@ namespace {
 
 constexpr uint64_t kMaxReplacedReportBytes = uint64_t{1} << 24;
 
-// Returns the report at `path`, or nullopt if there is no report about a file of this size.
+// Returns the report at `path`, or nullopt if it is missing or about an output of another size.
 std::optional<BuildReport> report_at(FileSystem& files, const std::string& path,
                                      uint64_t output_bytes) {
   try {
@@ -31,8 +31,8 @@ std::optional<BuildReport> report_at(FileSystem& files, const std::string& path,
   return std::nullopt;
 }
 
-// Returns the report of the build that wrote the output, or nullopt if there is no such report. The
-// earlier build may have written its report to the default path.
+// Returns the report of the build that wrote the output, or nullopt if it is not found. Looks at
+// this build's report path, and then at the default path, which the earlier build may have used.
 std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions& run,
                                             uint64_t output_bytes) {
   auto report = report_at(files, report_path(run), output_bytes);

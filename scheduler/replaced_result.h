@@ -1,4 +1,4 @@
-// Protects the DAG of one scene against a build of another scene with the same output.
+// Refuses to replace the DAG of one scene by the DAG of another scene.
 #pragma once
 
 #include "scheduler/spec/build_spec.h"

@@ -122,7 +122,8 @@ void plan(BuildJob& job, const PreparedScene& scene) {
   job.start_over = false;
 }
 
-// Accepts subvolumes built by earlier runs, then removes segments without a row in the job store.
+// Accepts subvolumes built by earlier runs, then removes segments that neither the job store nor a
+// FilledParts of the job names.
 void resume_subvolumes(BuildJob& job, SubvolumeBuilder& builder, const std::string& scene_digest) {
   builder.resume(scene_digest);
   if (!job.spec.run.cluster) {
@@ -151,7 +152,8 @@ void report_artifacts(BuildJob& job) {
     job.report.artifact_nodes += subvolume.summary.dag_nodes;
 }
 
-// Opens the sample rows or the filled parts of a solid, if an earlier run saved them.
+// For a solid, opens its sample rows (SolidRows) or, if the solid is enclosed, its filled parts
+// (FilledParts). Loads their state if an earlier run saved it.
 void open_solid(BuildJob& job, const std::string& scene_digest) {
   const GeometryOptions& geometry = job.spec.geometry;
   const std::string identity = scene_digest + " " + geometry_json(geometry);

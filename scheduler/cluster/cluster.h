@@ -1,5 +1,5 @@
-// The interface through which other folders run cluster builds. scheduler/slurm/ implements these
-// functions. With VOXDAG_CLUSTER=OFF, without_cluster.cc implements them instead: they refuse
+// The interface through which other folders run cluster builds. scheduler/slurm/ implements its
+// functions. With VOXDAG_CLUSTER=OFF, without_cluster.cc implements them: these versions refuse
 // cluster options and cannot stop the tasks of earlier builds.
 #pragma once
 

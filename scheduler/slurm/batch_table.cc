@@ -35,16 +35,16 @@ void BatchTable::resume(const std::string& scene_digest, const DagShape& shape) 
     start_new(scene_digest, shape);
   }
   earlier_requests_ = state_.totals.requests;
-  // Segment names contain batch numbers. New numbers start after the segments of all recorded
-  // subvolumes, so they are unique even if cluster.json was lost.
+  // Segment names contain batch numbers. New batches get numbers above the numbers in the segments
+  // of all recorded subvolumes, so their segments have new names even if cluster.json was lost.
   for (const StoredSubvolume& subvolume : cluster_.job.store->leaves()) {
     rows_[subvolume.id] = subvolume;
     if (const uint32_t segment = subvolume.artifact.segment; segment >= kFirstClusterSegment)
       state_.next_batch = std::max(state_.next_batch, segment - kFirstClusterSegment + 1);
   }
-  // Drops an open batch if its batch file is missing, or if one of its subvolumes is not in the job
-  // store or already built. A subvolume is already built if the earlier process accepted the record
-  // and was killed before it saved this table.
+  // Drops an open batch if its batch file is missing, or if one of its subvolumes is already built
+  // or is missing in the job store. A subvolume is already built if the earlier process accepted
+  // the record and was killed before it saved this table.
   std::erase_if(state_.open, [&](const OpenBatch& batch) { return !is_valid(batch); });
   save();
 }

@@ -31,8 +31,9 @@ class BatchTable {
  public:
   explicit BatchTable(ClusterContext& cluster) : cluster_(cluster) {}
 
-  // Loads the table of an earlier run with the same scene, grid and program version. Otherwise
-  // cancels the tasks of the earlier table, if any, and starts an empty table.
+  // Loads the table of an earlier run with the same scene, grid, rules and program version. (Builds
+  // without cluster options accept any version.) Otherwise cancels the merge job and the tasks of
+  // the earlier table, if any, and starts an empty table.
   void resume(const std::string& scene_digest, const DagShape& shape);
 
   const ClusterState& state() const { return state_; }
@@ -47,8 +48,8 @@ class BatchTable {
   // in bins[i] of the store `triangles`.
   void add(std::span<const StoredSubvolume> subvolumes, std::span<const BinId> bins,
            const TriangleStore& triangles);
-  // Replaces a batch by at most two batches of about equal weight. They contain its subvolumes, or
-  // the octants of its only subvolume. Returns the numbers of the new batches.
+  // Replaces a batch by at most two batches of about equal weight. These contain the batch's
+  // subvolumes or, if it has only one, this subvolume's octants. Returns the new batches' numbers.
   std::vector<uint32_t> split(uint32_t batch);
   bool can_be_split(const OpenBatch& batch) const;
   // Records the subvolumes of a built batch in the job store and closes the batch. The batch's

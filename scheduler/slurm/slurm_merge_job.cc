@@ -18,8 +18,8 @@ namespace {
 constexpr uint64_t kMaxReportBytes = uint64_t{1} << 24;
 // Pause between two searches for the merge job's files.
 constexpr double kFilesPauseS = 0.5;
-// Maximum time until an NFS client sees a new file, if it looked for the file before the file
-// existed (acdirmax, nfs(5)). Includes a margin.
+// Maximum time until an NFS client sees a new file, if the client has looked for this file before
+// it existed: the default of the mount option acdirmax (nfs(5)), and a margin.
 constexpr double kMaxDelayS = 75;
 // Bytes from the end of a log that are quoted in a message.
 constexpr uint64_t kMaxTailBytes = 600;
@@ -95,8 +95,8 @@ class SlurmMergeJob : public MergeJob {
   bool is_running_ = false;
   uint64_t shown_built_ = 0;
   std::set<std::string> warned_reasons_;  // reported reasons why the job waits
-  // Names from the last cluster state that was read. They are kept because a finished job removes
-  // the state.
+  // The names of the merge job and of the tasks in Slurm, from the last cluster state that was
+  // read. They are kept because a finished merge job removes the state.
   std::string name_, task_name_;
 };
 

@@ -12,7 +12,8 @@
 namespace voxdag {
 namespace {
 
-// Path of the running program: tasks on other machines must run the same version.
+// Returns the path of the running program. Tasks run the program at this path, so they have the
+// same version.
 std::string this_program() {
   const std::string path = std::filesystem::read_symlink("/proc/self/exe").string();
   if (!std::filesystem::exists(path))
@@ -82,8 +83,9 @@ void TaskPoller::warn_waiting(const SlurmTask& task) {
 }
 
 // Cancels tasks that Slurm will never start. If Slurm does not accept the request, adds their
-// batches to `listed`, so that end_missing() leaves them alone. Otherwise the next attempt starts
-// after the grace period, because a node that fails immediately could also take the new task.
+// batches to `listed`, so that end_missing() does not end their attempts. If Slurm accepts, the
+// next attempt starts only after the grace period. An immediate attempt could be sent to the same
+// faulty node, and fail again.
 void TaskPoller::cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed) {
   std::vector<std::string> names;
   for (const SlurmTask& task : tasks) names.push_back(task.name());

@@ -18,7 +18,7 @@ class TaskPoller {
  public:
   TaskPoller(ClusterContext& cluster, BatchTable& batches) : cluster_(cluster), batches_(batches) {}
 
-  // Forgets earlier failures. If a task of an earlier run fails, its failure is not counted.
+  // Begins a run. Failures of tasks that earlier runs started are not counted from now on.
   void begin_run();
   // Queries Slurm once for all tasks, then submits batches without a task. If Slurm no longer lists
   // a task, its batch must have a record after a grace period for the shared file system; otherwise

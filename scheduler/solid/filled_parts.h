@@ -1,7 +1,7 @@
 // The durable state of the stage `enclose`: the artifacts of the parts of the grid that it has
 // filled. They replace the artifacts of the shell in the merge. A filled part depends only on the
-// scene and on the geometry options, so a part of an earlier run remains right even if the grid is
-// divided in another way.
+// scene and on the geometry options, so a part that an earlier run has filled remains valid, even
+// if this run divides the grid differently.
 //
 // add_durable() and save() replace the record on the disk atomically (by renaming). Thread-safe,
 // except load(), complete() and forget().
@@ -54,7 +54,7 @@ class FilledParts {
   std::vector<FilledPart> parts() const;
   // Returns the artifacts of a complete record.
   std::vector<ArtifactRef> artifacts() const;
-  // Makes a complete record durable. Does nothing if it is, or if the record is not complete.
+  // Makes a complete record durable. Does nothing if the record is durable or not complete.
   void save();
 
   bool names_segment(uint32_t segment) const;

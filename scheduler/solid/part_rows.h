@@ -1,4 +1,4 @@
-// The rows of the parts of a split subvolume.
+// The sample rows (row_sums.h) of the parts of a split subvolume.
 #pragma once
 
 #include <span>

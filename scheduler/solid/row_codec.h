@@ -1,6 +1,6 @@
-// Compresses the numbers of sample rows (row_sums.h) as runs of equal numbers. A run is encoded as
-// the difference from the previous run's number and the run's length, both as variable-length
-// integers. Most rows have the same number as their neighbor, so runs are long.
+// Compresses arrays with one integer per sample row (row_sums.h) as runs of equal integers. A run
+// is encoded as two variable-length numbers: the difference from the previous run's integer, and
+// the number of rows. Most rows have the same integer as their neighbor, so runs are long.
 #pragma once
 
 #include <cstddef>

@@ -25,12 +25,13 @@ constexpr uint64_t solid_row_bytes(int64_t edge) {
   return 3 * side * side * sizeof(int32_t);
 }
 
-// The number of a row encodes its crossings: twice the sum of their signs, plus 1 if there are any.
+// A sample row's `number` encodes its crossings: twice the sum of their signs, plus 1 if the row
+// has a crossing.
 constexpr int32_t row_sum(int32_t number) { return number >> 1; }
 constexpr bool has_crossing(int32_t number) { return (number & 1) != 0; }
 inline void add_crossing(int32_t& number, int sign) { number = (number + 2 * sign) | 1; }
 
-// Adds up the crossings of triangles with each sample row of a cube, within the cube. Not
+// Adds up, for each sample row of a cube, the row's crossings with triangles inside the cube. Not
 // thread-safe.
 class RowSums {
  public:

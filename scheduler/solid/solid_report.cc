@@ -9,9 +9,9 @@
 namespace voxdag {
 namespace {
 
-// Limits for the open sample rows, as a fraction of all crossed rows. Above kClosed, a warning
-// reports that the surface is not closed. Above kScene, the warning adds that it is more a scene
-// than an object.
+// Limits for the number of open sample rows (RowCounts), as a fraction of all rows with a crossing.
+// Above kClosed, a warning reports that the surface is not closed. Above kScene, the warning adds
+// that the input is more a scene than an object.
 constexpr double kClosed = 0.001, kScene = 0.05;
 
 std::string percent_text(double part) {

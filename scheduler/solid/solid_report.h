@@ -22,7 +22,7 @@ SolidReport enclosed_report(uint64_t voxels, uint64_t shell);
 // Returns the volume of these voxels, in cubic units of the scene.
 double solid_volume(const Grid& grid, uint64_t voxels);
 
-// Returns the warning for a seed whose space reaches the border of the grid.
+// Returns the warning for a seed whose empty space reaches the border of the grid.
 Warning seed_warning(const Seed& seed, const std::string& scene);
 
 // Returns a warning if the surface is open, if its faces are oriented inconsistently, if the faces

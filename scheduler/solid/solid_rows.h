@@ -5,9 +5,9 @@
 //   rows      compressed views of one subvolume along one axis
 //   index     the job, the subvolumes with the places of their rows, the full cubes, the counts
 //
-// Bins of built subvolumes are freed, so the views cannot be computed again once a subvolume is
-// built. save() makes everything durable: it appends an index, and then replaces the header, which
-// has the place of the last index. Thread-safe, except load() and start().
+// The triangles of built subvolumes are freed, so the views cannot be computed again once a
+// subvolume is built. save() makes everything durable: it appends an index, and then replaces the
+// header, which has the place of the last index. Thread-safe, except load() and start().
 #pragma once
 
 #include <array>
@@ -31,10 +31,10 @@ constexpr std::array<const char*, 3> enum_names(SolidRule) { return {"", "windin
 // State of a subvolume in a solid. A unit is a maximal cube without voxels of the shell; it is
 // filled or left empty as one piece (core/geometry/solid_rule.h).
 enum class SolidUnit : uint32_t {
-  kShell,      // it has voxels of the shell
-  kEmptyUnit,  // it has none: a part of a split subvolume that is one unit
-  kEmpty,      // it has none: a planned subvolume, whose unit is in SolidRows::full_cubes if it is
-               // inside the solid
+  kShell,      // the subvolume has voxels of the shell
+  kEmptyUnit,  // a part of a split subvolume without voxels of the shell; the part is a unit
+  kEmpty,      // a planned subvolume without voxels of the shell; SolidRows::full_cubes has the
+               // unit that contains it, if this unit is inside the solid
 };
 
 constexpr std::array<const char*, 3> enum_names(SolidUnit) { return {"", "empty-unit", "empty"}; }

@@ -10,7 +10,7 @@
 namespace voxdag {
 
 std::string report_json(const BuildReport& report) {
-  // Paths may not be UTF-8, but JSON must be.
+  // Replaces invalid UTF-8, which paths can contain but JSON cannot.
   return record_json(report).dump(2, ' ', false, FieldJson::error_handler_t::replace);
 }
 

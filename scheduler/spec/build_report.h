@@ -62,7 +62,7 @@ struct BuildReport {
   std::string merge_request;  // only if a merge job wrote the output (MergeJob::request())
 };
 
-// Path of the report of a build that chooses no other path.
+// Default path of the report of a build with this output path.
 inline std::string default_report_path(const std::string& output) {
   return output + ".report.json";
 }

@@ -47,7 +47,7 @@ struct GeometryOptions {
   CutoutRule cutouts = CutoutRule::kDefault;
   std::optional<double> point_radius;         // half edge of the cube that replaces each point
   std::string columns;                        // names of the columns of text files with points
-  std::vector<std::string> ignore_extension;  // required extensions of glTF files
+  std::vector<std::string> ignore_extension;  // required glTF extensions to ignore
   uint32_t hash_bits = 64;
   SolidName solid = SolidName::kNone;  // the rule that fills the interior
   // A point in scene units. If it is set, only its enclosed space is filled.
@@ -118,8 +118,8 @@ struct RunOptions {
   uint64_t min_free_bytes = 0;
   // Seconds between checkpoints: CPU time during the merge, wall time in the stages before it.
   double checkpoint_interval_s = 2;
-  // Ingest makes checkpoints only for scenes with at least this many triangles. Reading such a
-  // scene takes about two CPU seconds.
+  // Ingest makes checkpoints only for scenes with at least this many triangles. Smaller scenes are
+  // read again instead, which takes at most about two CPU seconds.
   uint64_t durable_min_triangles = uint64_t{4} << 20;
   // Maximum seconds to wait for locks held by another build, because that build may be about to
   // end.

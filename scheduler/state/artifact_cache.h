@@ -55,7 +55,7 @@ class ArtifactCache {
   const std::string folder_;
   const uint64_t limit_bytes_;
   std::mutex mutex_;          // guards known_bytes_
-  uint64_t known_bytes_ = 0;  // bytes at the last listing plus added bytes
+  uint64_t known_bytes_ = 0;  // bytes of entries when last listed, and of entries added since
   std::atomic<uint64_t> partials_{0};
 };
 

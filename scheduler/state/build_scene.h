@@ -11,7 +11,7 @@
 
 namespace voxdag {
 
-// Returns the options that decide how the scene's files are read. Its scratch_path is "".
+// Returns the options that decide how the scene's files are read. Leaves scratch_path empty.
 SceneOptions scene_options_of(const GeometryOptions& options);
 
 class BuildScene {

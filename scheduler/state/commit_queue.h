@@ -37,8 +37,9 @@ class CommitQueue {
   SegmentWriter& segment() { return *segment_; }
 
   // Adds a subvolume that was built from the triangles in `bin`; its artifact, if any, is in the
-  // segment. Drops the bin now, and releases it after the subvolume is recorded. Waits if the disk
-  // is one complete group behind. Throws the error of an earlier group.
+  // segment. Drops the bin now, and releases it after the subvolume is recorded. If the subvolume
+  // completes a group while the previous group is still being committed, waits for the previous
+  // group. Throws the error of an earlier group.
   void add_built(const StoredSubvolume& subvolume, BinId bin);
   // Starts making all built artifacts durable.
   void commit_in_background();

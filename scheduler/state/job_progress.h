@@ -27,7 +27,7 @@ class JobProgress : public Progress {
   void set_total(uint64_t total) override;
   void end_stage() override;
   void warn(std::string_view message) override { shown_.warn(message); }
-  // Forwards the warning and records it for the report. Throws it instead in a strict build.
+  // Forwards the warning and records it for the report. In a strict build, throws it as an error.
   void warn_of_input(const Warning& warning) override;
   void set_subvolumes(uint64_t resolution, std::span<const SubvolumeStatus> all) override {
     shown_.set_subvolumes(resolution, all);

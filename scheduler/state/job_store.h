@@ -4,16 +4,16 @@
 //
 // Invariants:
 //   1. A row names an artifact only after the artifact's bytes were synced.
-//   2. Subvolumes form a forest. The children of a split subvolume are those of its octants that
-//      contain triangles. Only leaves are built.
+//   2. Subvolumes form a forest. The children of a split subvolume are its octants that contain
+//      triangles or, in a solid, full octants. Only leaves are built.
 //   3. Every row that determines the result has a checksum; a mismatch is Error{kCorrupt}.
 //      The ids of n subvolumes are 1 to n, and the job's row has n, so a missing row is also
 //      Error{kCorrupt}.
 //   4. All rows of one call are committed together or not at all.
 //
 // Thread-safe. The work folder's lock ensures that only one process writes. Readers (`voxdag
-// status`) may open the same file at any time. A subvolume can be built before its row says so
-// durably. Until then, only leaves() of the writer's object returns it as built.
+// status`) may open the same file at any time. A subvolume can be built before its row durably
+// records this. Until then, only leaves() of the writer's object returns it as built.
 #pragma once
 
 #include <cstddef>

@@ -19,7 +19,7 @@ namespace {
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
 constexpr std::string_view kClusterName = "cluster";
-// Threads that remove files. Removing a cached file takes half a second per GB.
+// Number of threads that remove files. A thread takes half a second per GB of a cached file.
 constexpr unsigned kRemovers = 4;
 
 // Returns the id in "segment-<id>.vdseg".

@@ -60,7 +60,7 @@ class WorkFolder {
   // kFirstClusterSegment.
   uint32_t next_segment_id() const;
   // Returns the bytes of the files in the work folder and in its folders `merge` and `cluster`,
-  // without released parts. For reports.
+  // without the parts of segments that release() has freed. For reports.
   uint64_t bytes() const;
 
   // Frees the disk space of a part of a segment that is no longer needed. Not thread-safe.

@@ -23,8 +23,8 @@ namespace voxdag {
 
 class RecordStore {
  public:
-  // Charges chunks to `share`; messages call the charge `what`. Chunks that do not fit in `share`
-  // are written to a file at `spill_path`, which the first such chunk creates.
+  // Charges chunks to `share`; `what` names the charge in messages. Chunks that do not fit in
+  // `share` are written to a file at `spill_path`, which the first such chunk creates.
   RecordStore(FileSystem& files, std::string spill_path, MemoryBudget& share,
               const std::string& what);
   // Removes the spill file.

@@ -35,7 +35,7 @@ void append_identity(const FixedSurface& surface, const Cutouts* cutouts, size_t
                      std::vector<std::byte>& out);
 
 // Reads the records in `bytes`, in the form that append_surface() writes. The caller has verified
-// the checksum of the bytes. Invalid records are reported as damage of the file.
+// the checksum of the bytes.
 class SurfaceRecords {
  public:
   explicit SurfaceRecords(std::span<const std::byte> bytes) : in_(bytes) {}

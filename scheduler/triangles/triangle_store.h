@@ -56,8 +56,8 @@ class TriangleStore {
   // Reads the bin's triangles, starting at index `first`. The store must outlive the stream.
   virtual std::unique_ptr<TriangleStream> open(BinId bin, uint64_t first = 0) const = 0;
 
-  // Ends this run's reading of the bin. Returns true if references remain. The caller must then
-  // call release() when the bin's artifact is durable.
+  // Call it when this run does not read the bin again. Returns true if references remain. The
+  // caller must then call release() when the bin's artifact is durable.
   virtual bool drop(BinId bin) = 0;
   // Adds one reference.
   virtual void retain(BinId bin) = 0;

@@ -60,7 +60,8 @@ class FileActions {
 
 class Attributes {
  public:
-  // Gives signals that this process may ignore their default actions in the started program.
+  // Resets the signals below to their default actions in the started program, which would
+  // otherwise inherit that this process ignores them.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;

@@ -152,8 +152,8 @@ bool Slurm::may_be_starting(const CommandResult& refused) {
 }
 
 void Slurm::check(const std::vector<std::string>& options, double pause_s, Progress& progress) {
-  // voxdag itself sets these options. With other values a task would not be found or would build
-  // another batch.
+  // voxdag itself sets these options. With a user's values, voxdag would not find its tasks, or
+  // they would build the wrong batches.
   for (const std::string& option : options)
     for (const std::string name :
          {"--array", "--job-name", "--comment", "--wrap", "--wait", "--parsable", "--test-only",
@@ -209,7 +209,7 @@ std::string Slurm::setting(const std::string& name) {
 void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks) {
   const uint32_t size =
       std::max<uint32_t>(number(setting("MaxArraySize")).value_or(kDefaultMaxArraySize), 1);
-  std::map<uint32_t, std::vector<uint32_t>> arrays;  // array indexes, by the batch of index 0
+  std::map<uint32_t, std::vector<uint32_t>> arrays;  // key: batch of index 0; value: the indexes
   std::vector<uint32_t> batches = request.batches;
   std::ranges::sort(batches);
   for (const uint32_t batch : batches) arrays[batch / size * size].push_back(batch % size);

@@ -126,7 +126,8 @@ class Slurm {
   std::optional<std::string> configuration_;
 };
 
-// True if a task that waits for this reason will start without help; false if a person must act.
+// True if a task that waits for this reason will start without help; false if a person may have to
+// act.
 bool waits_for_its_turn(const std::string& reason);
 
 // Splits a text into words as a shell does: at blanks outside of quotes. A backslash outside of

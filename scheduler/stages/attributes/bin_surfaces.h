@@ -31,7 +31,7 @@ struct SurfaceBinning {
 struct BinnedSurfaces {
   std::vector<ChunkList> bins;       // one per cube, in the order of `cubes`
   std::vector<BinContent> contents;  // contents of each bin
-  bool have_colors = false;          // a surface in the grid has an image, or a color but white
+  bool have_colors = false;          // a surface in the grid has an image, or is not white
 };
 
 // Puts the surfaces of the scene into the bins of the cubes, and returns the bins. Their records

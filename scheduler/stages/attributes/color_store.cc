@@ -137,8 +137,8 @@ ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool 
     reader_ = files_.open_own(path_);
   }
   const Place place{end_ + kHeaderBytes, part.size(), checksum};
-  // The part is written before its header. So the bytes of every header's part exist, unless the
-  // power was cut.
+  // The part is written before its header. So if the file has a header, it also has the header's
+  // part, unless the power was cut.
   writer_->write_at(place.offset, part);
   writer_->write_at(end_, header);
   end_ = place.offset + place.bytes;
@@ -156,7 +156,7 @@ void ColorStore::keep_only(std::span<const Checksum128> keys, const CancelToken&
   }
   if (end_ <= 2 * retained_bytes + kTolerableBytes) return;
   // If this run is killed, the copy remains until the next copy or the removal of the work folder.
-  // Its ending marks it as a file of voxdag (work_folder.cc).
+  // The ending of its name marks the copy as a file of voxdag (work_folder.cc).
   const std::string copy_path = path_ + ".vdspill";
   uint64_t end = 0;
   try {

@@ -79,7 +79,7 @@ void CubeBaker::bake(const Cube& cube, ChunkList& bin, const Sink& sink) {
 }
 
 // Bakes a cube whose surfaces do not fit in memory: distributes the surfaces to the cube's eight
-// children and bakes each child. A single region is baked in parts instead.
+// children and bakes each child. If the cube is a single region, calls bake_in_parts() instead.
 void CubeBaker::divide(const Cube& cube, ChunkList& bin, const Sink& sink) {
   if (cube.level == grid_.region_level()) return bake_in_parts(cube, bin, sink);
   std::array<ChunkList, 8> children;
@@ -208,8 +208,8 @@ bool CubeBaker::charge_sums(uint64_t bytes) {
   return sum_charge_.try_resize(more);
 }
 
-// Adds the cells of the baked cube to the encoders of its region. `first_code` is the code of the
-// cube's first cell within the region.
+// Adds the cells of the baked cube to the encoders of its region. `first_code` is the Morton code,
+// within the region, of the cube's first cell.
 void CubeBaker::collect(uint32_t first_code, std::span<AttributeEncoder> encoders) const {
   for (AttributeEncoder& encoder : encoders) encoder.add(cells_, values_, first_code);
 }

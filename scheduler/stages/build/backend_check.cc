@@ -12,7 +12,7 @@ namespace {
 constexpr uint32_t kGridLevels = 9;
 constexpr uint64_t kBudgetBytes = uint64_t{256} << 20;
 
-// Returns `count` pseudorandom triangles in the complete grid. Their sizes range from a quarter of
+// Returns `count` pseudorandom triangles anywhere in the grid. Their sizes range from a quarter of
 // a voxel to a quarter of the grid. Every eighth triangle is a sliver.
 std::vector<FixedTriangle> check_triangles(int count) {
   uint64_t state = 0x9e3779b97f4a7c15ull;

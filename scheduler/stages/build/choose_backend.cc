@@ -30,7 +30,7 @@ BackendChoice cpu_choice() {
   return {"cpu", [] { return make_cpu_backend(); }};
 }
 
-// Returns the choice of the GPUs. Its open() assigns the workers to the GPUs round-robin.
+// Returns the choice of the backend `cuda`. Each call of its open() opens the next GPU, in turn.
 BackendChoice gpu_choice(const Gpus& gpus) {
   const auto next = std::make_shared<std::atomic<int>>(0);
   return {"cuda", [gpus, next] { return gpus.open((*next)++ % gpus.count); },

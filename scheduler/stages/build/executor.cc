@@ -43,7 +43,8 @@ class Queue {
     ++in_flight_;
     return next;
   }
-  // Replaces a popped subvolume by `parts`. A built subvolume has no parts.
+  // Called when the work on a subvolume from pop() has ended. Queues `parts`: the octants that
+  // replace the subvolume if it was split, nothing if it was built.
   void done(const std::vector<QueuedSubvolume>& parts) {
     std::lock_guard lock(mutex_);
     --in_flight_;

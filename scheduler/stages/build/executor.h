@@ -1,7 +1,7 @@
 // Builds subvolumes on worker threads. Each worker repeatedly takes the heaviest remaining
-// subvolume and builds it with its own backend. It appends the artifact to its own segment file and
-// passes it to its CommitQueue. A worker splits a subvolume that needs more memory than the
-// worker's share into octants, which are queued instead.
+// subvolume and builds it with its own backend. The worker appends the artifact to its own segment
+// file, and adds the subvolume to its own CommitQueue. If a subvolume needs more memory than the
+// worker's share, the worker splits it into octants, which are queued and built separately.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +30,9 @@ struct ExecutorOptions {
   DagShape shape;
   VoxelRule rule = VoxelRule::kShell;
   unsigned threads = 1;
-  uint64_t built = 0;  // subvolumes built by earlier runs, for the progress
-  // In voxels. A subvolume with a longer edge is split without an attempt to build it, unless its
-  // edge is at most kSmallestEdge.
+  uint64_t built = 0;  // subvolumes built by earlier runs, for the progress display
+  // Maximum edge of a subvolume in voxels. A subvolume with a longer edge is split without an
+  // attempt to build it, unless its edge is at most kSmallestEdge.
   int64_t longest_edge = INT64_MAX;
   std::function<std::unique_ptr<Backend>()> open_backend;
   std::string segment_folder;

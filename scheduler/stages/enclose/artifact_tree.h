@@ -16,9 +16,9 @@ namespace voxdag {
 class ArtifactTree {
  public:
   enum class Kind : uint8_t {
-    kEmpty,   // the cube overlaps no cube of a root, so it has no voxels
+    kEmpty,   // no root of an artifact overlaps the cube, so it has no voxels
     kInside,  // the cube is inside the cube of one root
-    kDivided  // smaller cubes of roots are inside the cube
+    kDivided  // the cube contains smaller cubes of roots
   };
   struct Place {
     Kind kind = Kind::kEmpty;

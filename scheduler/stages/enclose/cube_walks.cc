@@ -73,8 +73,9 @@ class WalkPass {
  private:
   using Places = std::array<ArtifactTree::Place, kCubes>;
 
-  // Returns a neighbor of the cube, or the cube itself if `neighbor` is 0, as a cube of the
-  // artifacts' grid. Returns nullopt if it is outside this grid.
+  // Returns a neighbor of the cube, or the cube itself if `neighbor` is 0, as a cube of the grid
+  // in which the artifacts in tree_ are: the voxels' grid for kBlocked, the positions' grid for
+  // kEnclosed. Returns nullopt if the neighbor is outside this grid.
   std::optional<Cube> source_cube(const Cube& cube, int neighbor) const {
     Cube out = cube;
     for (int a = 0; a < 3; ++a) {
@@ -90,8 +91,8 @@ class WalkPass {
     for (int n = 0; n < kCubes; ++n)
       if (const auto source = source_cube(cube, n))
         out[static_cast<size_t>(n)] = tree_.find(*source);
-    // The complete grid of the positions is outside the artifacts' grid for source_cube(), but
-    // contains it. So find_cubes() must divide it.
+    // For the complete grid of the positions, source_cube() returns nullopt, because it is larger
+    // than the voxels' grid. But it contains the voxels' grid, so find_cubes() must divide it.
     if (kind_ == Kind::kBlocked && cube.level == 0) out[0].kind = ArtifactTree::Kind::kDivided;
     return out;
   }
@@ -101,8 +102,8 @@ class WalkPass {
         places, [](const auto& place) { return place.kind == ArtifactTree::Kind::kEmpty; });
   }
 
-  // Adds the largest cubes in `cube` to cubes_ for which a single artifact has all voxels of the
-  // cube, and a single artifact has all voxels of each neighbor. Skips cubes with an empty result.
+  // Divides `cube` until neither a cube nor one of its neighbors is kDivided (artifact_tree.h).
+  // Adds the resulting cubes to cubes_, except cubes with an empty result.
   void find_cubes(const Cube& cube) {
     const Places around = places(cube);
     if (is_empty(around)) return;

@@ -1,7 +1,7 @@
-// Two passes of the stage `enclose` that builds with --radius V need, because a cube of V + 1
-// voxels per edge walks through the empty space (core/dag/space/cube_walk.h explains the terms).
-// One pass precedes the search for enclosed space, which finds the closed positions; the other
-// follows it:
+// Two passes of the stage `enclose` that only builds with --radius V have. In these builds a cube
+// of V + 1 voxels per edge walks through the empty space (core/dag/space/cube_walk.h explains the
+// terms). The stage's search for enclosed space then finds the closed positions. One of the passes
+// precedes this search, the other follows it:
 //
 //   shell -> find_blocked() -> blocked positions -> closed positions -> find_enclosed() -> solid
 //
@@ -21,13 +21,13 @@ namespace voxdag {
 // Returns the shape of the grid of the positions. `shape` is the shape of the grid of the voxels.
 DagShape position_shape(const DagShape& shape);
 
-// Computes the blocked positions from the voxels of `shell`, and completes `blocked` with them.
+// Computes the blocked positions from the voxels of `shell`. Passes them to blocked.complete().
 // Throws Error{kCorrupt} for a damaged artifact.
 void find_blocked(BuildJob& job, const std::vector<FilledPart>& shell, FilledParts& blocked);
 
-// Computes the enclosed voxels, which include the shell, from the closed positions in `closed`, and
-// completes `solid` with them. Warns if the shell has all voxels of the solid. Throws like
-// find_blocked().
+// Computes the enclosed voxels, which include the shell, from the closed positions in `closed`.
+// Passes them to solid.complete(). Warns if the solid has no voxels but the shell's. Throws as
+// find_blocked() does.
 void find_enclosed(BuildJob& job, const std::vector<FilledPart>& closed, FilledParts& solid);
 
 }  // namespace voxdag

@@ -57,7 +57,7 @@ std::optional<Seed> start_of_walks(const BuildJob& job, const DagShape& shape) {
 class Enclosure {
  public:
   // Fills the empty space that `walls` enclose. `shape` is the shape of the grid that has the
-  // walls. The filled parts complete `result`.
+  // walls. Passes the filled parts to result.complete().
   Enclosure(BuildJob& job, const std::set<Cube>& too_large, const std::vector<FilledPart>& walls,
             const DagShape& shape, FilledParts& result)
       : job_(job),
@@ -123,9 +123,9 @@ class Enclosure {
     for (int octant = 0; octant < 8; ++octant) label_part(worker, cube.child(octant), shell);
   }
 
-  // Labels a cube with at most 1/`divisor` of the worker's share. Filling the cube later needs more
-  // memory than labeling it, so a cube that needs more for its labels would not fit then. Throws
-  // OutOfBudget.
+  // Labels a cube in at most 1/`divisor` of the worker's share of the memory. Throws OutOfBudget if
+  // this is not enough. Filling the cube later needs more memory than labeling it, so such a cube
+  // would not fit in the share.
   void try_label(EncloseWorker& worker, const Cube& cube, const ArtifactRef& shell,
                  uint64_t divisor) {
     const uint64_t limit = worker.share.limit() / divisor;
@@ -262,11 +262,11 @@ class Enclosure {
   std::mutex mutex_;  // guards parts_ while labels are computed, and kept_
   std::vector<LabeledPart> parts_;
   std::optional<MemoryBudget> kept_budget_;
-  std::map<Cube, std::unique_ptr<LabeledSpace>> kept_;  // labels that are not computed again
+  std::map<Cube, std::unique_ptr<LabeledSpace>> kept_;  // labels kept for fill_part()
 };
 
-// Fills the empty space that `walls` enclose, and completes `result`. If a part exceeds the memory,
-// starts over with smaller parts there.
+// Fills the empty space that `walls` enclose, and passes the filled parts to result.complete(). If
+// a part does not fit in memory, starts over with this part divided.
 void enclose_space(BuildJob& job, const std::vector<FilledPart>& walls, const DagShape& shape,
                    FilledParts& result) {
   std::set<Cube> too_large;

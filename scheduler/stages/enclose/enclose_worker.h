@@ -29,8 +29,8 @@ class EncloseWorker {
   bool is_due(const BuildJob& job) const;
   // Makes the parts in `done` durable, and moves them to `result`.
   void save(FilledParts& result);
-  // Throws Error{kOutOfMemory}, which says that even a part of the smallest edge does not fit in
-  // the worker's share of the memory.
+  // Throws Error{kOutOfMemory}: even a part of the smallest edge does not fit in the worker's share
+  // of the memory.
   [[noreturn]] void refuse_memory() const;
 
   MemoryBudget share;
@@ -49,8 +49,8 @@ using EncloseWorkers = std::vector<std::unique_ptr<EncloseWorker>>;
 // Makes the workers that `memory` allows. Each worker writes to a new segment.
 EncloseWorkers make_enclose_workers(BuildJob& job, const WorkerMemory& memory);
 
-// Completes `result` with `parts`, whose artifacts are in segments of the workers or of earlier
-// runs. If a worker has saved parts, the pass has taken long; then also makes the complete record
+// Passes `parts` to result.complete(). Their artifacts are in segments of the workers or of earlier
+// runs. If the pass took so long that a worker has called save(), also makes the complete record
 // durable.
 void complete_pass(FilledParts& result, std::vector<FilledPart> parts, EncloseWorkers& workers);
 

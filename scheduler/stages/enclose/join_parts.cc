@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// Returns the faces of a cube that are on the border of the grid.
+// Returns a mask of the faces of a cube that are on the border of the grid.
 uint8_t border_faces(const Cube& cube) {
   uint8_t faces = 0;
   for (int a = 0; a < 3; ++a) {
@@ -153,7 +153,8 @@ class PartJoiner {
       out.of_parts[leaf.part].push_back(is_outside(first + static_cast<uint32_t>(c)) ? 1 : 0);
   }
 
-  // A cube of the tree, or a square on the face of a leaf, which the quadrants in `path` select.
+  // A cube of the tree or, if `path` is not empty, a part of a leaf's face: a quadrant, a quadrant
+  // of this quadrant, and so on, as `path` selects them.
   struct Place {
     PartTree::Ref ref;
     std::vector<uint8_t> path;

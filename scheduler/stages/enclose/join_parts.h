@@ -15,7 +15,7 @@ namespace voxdag {
 
 struct OutsideSpace {
   std::vector<std::vector<uint8_t>> of_parts;  // for each part and component: 1 if it is outside
-  std::vector<Cube> enclosed_cubes;            // empty cubes between the parts that are not outside
+  std::vector<Cube> enclosed_cubes;            // the enclosed empty cubes between the parts
   bool is_seed_outside = false;                // a walk leads from the seed to the border
 };
 

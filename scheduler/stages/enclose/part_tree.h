@@ -14,7 +14,7 @@ namespace voxdag {
 class PartTree {
  public:
   static constexpr uint32_t kEmpty = UINT32_MAX;
-  // A given cube, or an empty one.
+  // A given cube, or a maximal empty cube.
   struct Leaf {
     Cube cube;
     uint32_t part = kEmpty;  // index of the given cube

@@ -10,7 +10,7 @@
 namespace voxdag {
 namespace {
 
-// Marks the rows of a level that are needed, and numbers the marked rows.
+// Marks the rows (nodes) of a level that must be read, and numbers the marked rows.
 class NeededRows {
  public:
   NeededRows(PooledMemory& memory, uint64_t rows)

@@ -56,8 +56,8 @@ class SnappedPiece {
     checksum_ = checksum128(records());
   }
 
-  // Adds the patches of the triangles in late_, which have too many patches for the piece. Calls
-  // flush() whenever the buffer of records() is full, and at the end.
+  // Adds the patches (see ingest()) of the triangles in late_, whose patches did not fit in the
+  // piece. Calls flush() whenever the buffer of records() is full, and at the end.
   template <class Flush>
   void add_late(const Flush& flush) {
     for (const FixedSurface& surface : late_) {
@@ -83,7 +83,8 @@ class SnappedPiece {
   TopTree::Tally& tally() { return tally_; }
 
  private:
-  // Maximum number of patches of a piece, and of one triangle. add_late() adds further patches.
+  // Maximum number of patches in a piece. A triangle whose patches would exceed it is added by
+  // add_late().
   static constexpr size_t kMaxPatches = kPieceTriangles;
   static constexpr uint64_t kCutoutBytes =
       kPieceTriangles * (kMaxSurfaceRecordBytes + 2 * sizeof(FixedSurface)) +
@@ -118,9 +119,9 @@ class SnappedPiece {
     ++stored_;
   }
 
-  // Reads `count` triangles with their materials, from index `first` on. The checksum covers the
-  // triangles with their corners, not the patches, so that later stages can compare it with the
-  // scene.
+  // Reads `count` triangles with their materials, starting at index `first`. The checksum covers
+  // the triangles (append_identity()), not their patches, so that later stages can compare it with
+  // the scene.
   void read_surfaces(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     late_.clear();
     identity_.clear();
@@ -175,7 +176,7 @@ class SnappedPiece {
   std::optional<VisiblePatches> divider_;
   std::vector<FixedTriangle> patches_;  // of one triangle
   size_t patches_in_piece_ = 0;
-  std::vector<FixedSurface> late_;  // triangles with too many patches
+  std::vector<FixedSurface> late_;  // triangles whose patches exceed kMaxPatches
   std::vector<std::byte> identity_;
   IngestCounts counts_;
   std::optional<uint64_t> too_far_;

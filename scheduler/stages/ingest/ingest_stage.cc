@@ -23,12 +23,12 @@ namespace {
 // Maximum expected bricks per subvolume. Building that many takes a fraction of a second, and their
 // tables fit in the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
-// Maximum expected bricks per flat subvolume (SubvolumeLimits), which takes 3 to 16 ns per expected
-// brick. It is larger, because larger subvolumes store fewer equal nodes more than once, so the
-// merge has fewer rows.
+// Maximum expected bricks per flat subvolume (SubvolumeLimits). A flat subvolume takes only 3 to 16
+// ns per expected brick, so it may be larger. If subvolumes are larger, fewer nodes are stored in
+// several of them, so the merge reads fewer rows.
 constexpr double kMaxBricksPerFlatSubvolume = 128e6;
-// A flat subvolume usually needs less memory per expected brick than this. A subvolume that needs
-// more memory than a worker has is split.
+// Bytes of memory per expected brick, enough for most flat subvolumes. The others may need more
+// memory than a worker has; they are then split.
 constexpr double kBytesPerFlatBrick = 16;
 // A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
 // kMinBricksPerSubvolume expected bricks.
@@ -36,7 +36,7 @@ constexpr double kMinSubvolumes = 64;
 constexpr double kMinBricksPerSubvolume = 131072;
 // Minimum number of flat subvolumes per thread, so that the threads finish at about the same time.
 constexpr double kMinSubvolumesPerThread = 16;
-// Maximum wait until the file times of the scene can be trusted.
+// Maximum wait of enable_checkpoints() for trusted_from_ns().
 constexpr int64_t kMaxWaitNs = 200'000'000;
 // Maximum number of bins. With more bins, each bin's buffer would be too small. Large subvolumes
 // are split later instead.
@@ -173,8 +173,9 @@ class Preparation {
   }
   const Cutouts* cutouts() const { return cutouts_ ? &*cutouts_ : nullptr; }
 
-  // Enables checkpoints. If the scene's files are slightly too young for their times to be trusted,
-  // waits first.
+  // Enables checkpoints. If the scene's files were changed just before they were opened, a further
+  // change might leave their times as they are. Then first waits until trusted_from_ns(), unless
+  // this takes longer than kMaxWaitNs.
   void enable_checkpoints() {
     checkpoint_.forget();
     if (!checkpoint_.is_worthwhile(scene_.open())) return;

@@ -121,8 +121,8 @@ void TopTree::Tally::find_touched(const FixedTriangle& triangle) {
     return collect(triangle, cube,
                    morton_encode(cube.position[0], cube.position[1], cube.position[2]));
   }
-  // A box within one cell touches the cell; a box across two cells touches both, because it crosses
-  // their common face. Larger boxes need tests.
+  // A triangle whose bounding box is in one cell touches this cell. A triangle whose box is in two
+  // cells touches both, because it crosses their common face. Larger boxes need a test per cell.
   const int64_t units = (kUnitsPerVoxel << grid_levels_) >> depth_;
   for (int64_t x = box.low[0]; x <= box.high[0]; ++x)
     for (int64_t y = box.low[1]; y <= box.high[1]; ++y)

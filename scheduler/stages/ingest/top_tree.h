@@ -30,7 +30,7 @@ ExpectedWork expected_work(const SnappedTriangle& triangle);
 
 struct SubvolumePlan {
   Cube cube;
-  double weight = 0;       // expected bricks; a triangle's are divided among the cells it touches
+  double weight = 0;       // expected bricks; each triangle divides its bricks among its cells
   uint64_t triangles = 0;  // upper bound of the triangles that touch the cube
 };
 

@@ -14,8 +14,8 @@
 
 namespace voxdag {
 
-// Returns the different artifacts of built subvolumes. Several subvolumes may share one.
-// `store_path` is the job store that lists them, for messages.
+// Returns each artifact of the subvolumes once, although several subvolumes may share an artifact.
+// `store_path` is the job store that lists the subvolumes, for messages.
 std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes,
                                             const std::string& store_path);
 

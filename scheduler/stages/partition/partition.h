@@ -13,7 +13,7 @@
 
 namespace voxdag {
 
-// The tree above a set of disjoint cubes. It finds the cubes that a triangle touches.
+// An octree whose leaves are given, disjoint cubes. Finds the leaves that a triangle touches.
 class CubeTree {
  public:
   // `root` contains all `leaves`.

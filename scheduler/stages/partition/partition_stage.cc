@@ -25,8 +25,8 @@ std::vector<BinId> partition_prepared(PreparedScene& scene, std::span<const Cube
     triangles.release(kSceneBin);
   }
   const auto bins = assign_bins(triangles, state.grid.levels, cubes, buffer_bytes, context);
-  // Chunks of triangles are small heap blocks; without this call their memory would remain
-  // resident.
+  // Chunks of triangles are small heap blocks. Without this call, their memory would remain
+  // resident after it was freed.
   trim_heap();
   return bins;
 }

@@ -26,7 +26,7 @@ constexpr EstimateRange kFixedFileBytes = {0, 4096, 12288};
 constexpr double kArtifactOverFile = 1.02;
 // Bytes of the record of a surface with an image and without vertex colors.
 constexpr double kExpectedSurfaceBytes = 65;
-// Records of a surface: one in the bin of each cube that it touches.
+// Number of records per surface: one in the bin of each cube that the surface touches.
 constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
 constexpr double kSecondsPerCell = 1.2e-7;  // CPU time for the first attribute
 constexpr double kSecondsPerValue = 2e-8;   // per cell, for each attribute after the first

@@ -33,8 +33,8 @@ constexpr double kBytesGrowthPerDoubling = 1.04;
 // of an artifact per node.
 constexpr double kArtifactNodesPerUnique = 1.5;
 constexpr double kArtifactBytesPerNode = 16;
-// Upper bound of the bytes of a node, in an artifact or in the global file. An uncompressed node
-// takes fewer.
+// Upper bound of the bytes of a node, in an artifact or in the global file. Even an uncompressed
+// node takes fewer bytes.
 constexpr double kMaxDiskBytesPerNode = 40;
 // CPU time per DAG node of a build, divided by the CPU time per DAG node of its pilot. Measured on
 // real scenes.
@@ -80,9 +80,9 @@ EstimateRange grow_count(double PilotCounts::*count, const std::vector<PilotCoun
   return within(grow_as_surface(coarse, fine, doublings), 1 + 0.02 * doublings);
 }
 
-// Extrapolates the number of DAG nodes by a number of doublings of R from the last pilot. Starts
-// with the growth between the last two pilots, and reduces the growth's excess over kLateGrowth
-// with each doubling.
+// Extrapolates the number of DAG nodes of the last pilot to a resolution that is 2^doublings times
+// as high. Starts with the growth between the last two pilots, and reduces the growth's excess over
+// kLateGrowth with each doubling.
 double grow_as_dag(const std::vector<PilotCounts>& pilots, int doublings) {
   const double nodes = pilots.back().dag_nodes;
   if (pilots.size() < 2 || nodes == 0) return nodes * std::exp2(1.5 * doublings);
@@ -152,7 +152,7 @@ SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scen
           kEncloseBytesPerNode * in_memory * artifact_nodes};
 }
 
-// Extrapolates the interior of a solid. Copies the numbers of sample rows from the finer pilot.
+// Extrapolates the interior of a solid. Copies the counts of sample rows from the finer pilot.
 SolidEstimate estimate_solid(const GeometryOptions& options, const std::vector<PilotCounts>& pilots,
                              int doublings) {
   const PilotCounts& last = pilots.back();
@@ -175,8 +175,8 @@ SolidEstimate estimate_solid(const GeometryOptions& options, const std::vector<P
   return solid;
 }
 
-// Returns an upper bound of the disk space of a build, without pilots. It is several times the
-// actual size.
+// Returns an upper bound of the disk space of a build, without building pilots. The bound is
+// several times the actual size.
 double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
                       BuildScene& source, const StageContext& context) {
   // A triangle touches about A + E + 1 cubes, where A follows from its area and E from its extents
@@ -247,7 +247,8 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   estimate.free_memory = budget.limit();
   const auto pilots = build_pilots(options, scene, source, context);
   if (pilots.empty()) {
-    // There are too many triangles even for a small grid. Their expected voxels are an upper bound.
+    // Even the coarsest pilot does not fit in memory. The sum of the triangles' expected voxels is
+    // an upper bound of the voxels.
     estimate.voxels = {0, scene.state.counts.expected_voxels, scene.state.counts.expected_voxels};
     return estimate;
   }

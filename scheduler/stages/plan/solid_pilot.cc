@@ -134,7 +134,8 @@ SubDagSummary fill_pilot(PooledMemory& memory, const NodeLevels& shell,
                          SubDagSink& sink) {
   if (radius > 0) return fill_sealed(memory, shell, seed, radius, levels, sink);
   SpaceLabels labels(memory, shell);
-  // The faces of the cube are the border of the grid, so all labeled components are outside.
+  // Labels exist for the components that reach a face of the cube. The faces are the border of
+  // the grid, so all these components are outside.
   const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);
   SubDagTables tables(memory, static_cast<int>(levels));
   if (seed)

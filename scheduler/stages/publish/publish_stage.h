@@ -11,7 +11,7 @@
 namespace voxdag {
 
 // True if an earlier run published the output file, and the file and the inputs of its attribute
-// sections are unchanged. Then fills in the report.
+// sections are unchanged. If it returns true, it also fills in the report.
 bool is_published(BuildJob& job, AttributeSections& attributes);
 
 // Writes checksums, syncs and renames the file, and fills in the report.

@@ -14,7 +14,8 @@ namespace {
 
 constexpr uint64_t kBytesOfTile = sizeof(OutsideTile) + 96;  // with the map's node
 
-// Triangles of a piece of the scene that extend beyond the grid and that its sample rows can cross.
+// The triangles of a piece of the scene that extend beyond the grid and that the grid's sample rows
+// can cross.
 class LeavingPiece {
  public:
   explicit LeavingPiece(const Grid& grid)
@@ -84,7 +85,7 @@ void OutsideRows::add(const FixedTriangle& triangle) {
 
 void OutsideRows::add(int axis, int i, int j, bool is_before, int sign) {
   const int tiles = 1 << grid_.levels, blocks = grid_.blocks;
-  // A row on the border of tiles is in the squares of all of them.
+  // A row on a border between tiles is in all of these tiles.
   for (int f = i / blocks; f >= 0 && f * blocks + blocks >= i; --f)
     for (int s = j / blocks; s >= 0 && s * blocks + blocks >= j; --s) {
       if (f >= tiles || s >= tiles) continue;

@@ -83,9 +83,9 @@ class RowColumn {
   const int first_low_, second_low_;  // in tiles
   const int tiles_;
   const MemoryCharge charge_;
-  std::vector<int32_t> totals_;  // then the current views
+  std::vector<int32_t> totals_;  // the rows' totals; after begin(), the current views
   std::vector<bool> crossed_;
-  std::vector<int32_t> before_;  // crossings in front of the grid; empty if there are none
+  std::vector<int32_t> before_;  // crossings in front of the grid; empty if no row has any
 };
 
 template <class Number>

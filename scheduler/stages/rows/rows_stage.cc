@@ -71,8 +71,8 @@ class RowsStage {
   }
 
  private:
-  // Returns the number of threads for `items` if each thread needs `bytes`. All together use at
-  // most half of the free memory.
+  // Returns the number of threads for `items` items if each thread needs `bytes` of memory. All
+  // threads together use at most half of the free memory.
   unsigned threads_for(uint64_t bytes, size_t items) const {
     const uint64_t fit = context_.budget.available() / 2 / std::max<uint64_t>(bytes, 1);
     return static_cast<unsigned>(

@@ -1,6 +1,6 @@
 // A digest of the grid and of the snapped triangles, in the order of the scene. It detects scenes
-// that changed since a job began. A plain value: a checkpoint stores it and a later run continues
-// it.
+// that changed since a job began. A plain value: a checkpoint stores the digest, and a later run
+// adds the remaining pieces of the scene to it.
 #pragma once
 
 #include <string>

@@ -13,9 +13,9 @@
 namespace voxdag {
 namespace {
 
-// Upper bounds, in ns, of the steps in which the clock for file times advances. The step is usually
-// at most ten milliseconds. If no file time has a fraction of a second, it may be up to two
-// seconds.
+// Upper bounds, in ns, of the steps in which the clock for file times advances. A step is usually
+// at most ten milliseconds. If no time of a file has a fraction of a second, its file system may
+// store times with steps of up to two seconds.
 constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kTickNs = kSecondNs / 10;
 constexpr int64_t kCoarseTickNs = 2 * kSecondNs;
@@ -110,7 +110,8 @@ bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
 }
 
 void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
-  // If the options give the bounds, the triangles may all be outside and take no space.
+  // If the options give the bounds, all triangles may be outside the grid, where they need no
+  // space.
   if (spec_.run.force || spec_.geometry.bounds) return;
   const double bytes = static_cast<double>(scene.declared_triangles()) *
                        static_cast<double>(triangle_record_bytes(is_wide(spec_)));

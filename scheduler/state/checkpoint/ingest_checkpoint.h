@@ -35,7 +35,7 @@ struct TopTreeCells {
 
 class IngestCheckpoint {
  public:
-  // Without a job store there are no checkpoints, and triangles do not outlive the process.
+  // If `jobs` is null, no checkpoints are made, and triangles do not outlive the process.
   IngestCheckpoint(const BuildSpec& spec, JobStore* jobs, WorkFolder& work,
                    const BuildContext& context);
 
@@ -67,9 +67,9 @@ class IngestCheckpoint {
 
   // True if a checkpoint is due and the last one is durable.
   bool is_due();
-  // Makes the triangles in the store and, if given, `top` durable. Then writes a row of the job
-  // store with `state`, which refers to them. Sets the extents in `state`. Does nothing if
-  // checkpoints are not enabled, and disables them if a file of the scene has changed.
+  // Makes the triangles in the store and, if given, `top` durable, and sets their extents in
+  // `state`. Then writes `state` to its row of the job store. Does nothing if checkpoints are not
+  // enabled. If a file of the scene has changed, writes no row and disables checkpoints.
   void save(IngestState& state, std::optional<TopTreeCells> top = {});
   // Saves on another thread, so that ingest does not wait for the disk. The next call throws the
   // thread's error.
@@ -107,13 +107,14 @@ class IngestCheckpoint {
   std::future<void> pending_;  // while valid, its thread uses record_
 };
 
-// Returns the maximum disk space of the stored triangles of a scene, reached at the end of the
-// partition: all of them if the scene is large enough for checkpoints, otherwise those that do not
-// fit in memory. `records`: stored triangles, which are more than the scene's if parts of triangles
-// are cut out.
+// Returns the maximum disk space of a scene's stored triangles, reached at the end of the
+// partition. On the disk are all triangles if the scene is large enough for checkpoints, and
+// otherwise the triangles that do not fit in memory. `records`: number of stored triangles. It
+// exceeds `triangles` if patches replace triangles that are cut out in part.
 double max_disk_bytes(const BuildSpec& spec, uint64_t triangles, uint64_t records);
-// Returns the earliest Unix time, in nanoseconds, from which any change of these files is certain
-// to change their identities; INT64_MAX if an identity is unknown.
+// Returns the earliest Unix time, in nanoseconds, after which every change of one of these files
+// also changes its FileIdentity (core/io/file_system.h). An earlier change can get the same file
+// times as the change before it. Returns INT64_MAX if the identity of a file is unknown.
 int64_t trusted_from_ns(const std::vector<SourceFile>& files);
 
 }  // namespace voxdag

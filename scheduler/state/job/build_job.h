@@ -43,8 +43,8 @@ struct BuildJob {
   // Records finished work. Errors are ignored: the caller already handles an error, and subvolumes
   // that are not recorded are only built again.
   void commit_best_effort();
-  // Throws Error{kInvalidInput} because the work folder contains another job, with the difference
-  // between the jobs.
+  // Throws Error{kInvalidInput}: the work folder contains another job. `difference` tells how the
+  // jobs differ.
   [[noreturn]] void refuse(const std::string& difference) const;
 
   const BuildSpec& spec;
