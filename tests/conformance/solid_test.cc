@@ -24,8 +24,8 @@ oracle::SolidRule oracle_rule(SolidRule rule) {
   return rule == SolidRule::kWinding ? oracle::SolidRule::kWinding : oracle::SolidRule::kParity;
 }
 
-// Returns the information about surfaces outside the cube for its build: the views (view_of()) from
-// the sample rows' points on the low faces of the cube, computed from all triangles of the scene.
+// Returns the SolidEntry with which a cube is built: the views (view_of()) from the points of the
+// sample rows on the low faces of the cube, computed from all triangles of the scene.
 SolidEntry entry_of(const oracle::Triangles& scene, const Cube& cube, uint32_t levels,
                     SolidRule rule) {
   const int64_t edge = cube.edge_voxels(levels);

@@ -48,8 +48,8 @@ void check(void* p, size_t bytes, Access access, bool is_range) {
   }
 }
 
-// Suspends the checks while the simulation itself runs. It may share inline functions with the
-// backend's sources, and these functions are instrumented.
+// Suspends the checks while the simulation itself runs, because inline functions that it shares
+// with the backend's sources are instrumented.
 class Unwatched {
  public:
   Unwatched() { g_running.running = false; }

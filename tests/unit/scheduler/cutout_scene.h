@@ -13,7 +13,7 @@
 
 namespace voxdag {
 
-// Writes FOLDER/leaf.png. In every `period` columns of texels, one is transparent.
+// Writes FOLDER/leaf.png. One of every `period` columns of texels is transparent.
 inline void write_leaf_image(const std::string& folder, int period) {
   constexpr int kSize = 16;
   std::string pixels;

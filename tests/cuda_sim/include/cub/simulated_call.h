@@ -16,8 +16,8 @@ cudaError_t cub_call(const char* name, void* storage, size_t& bytes, size_t n, c
                      std::function<void()> work);
 
 // `work` must declare the reads and writes of its call with these functions. A range that overlaps
-// the storage is a violation. So is an output that overlaps an input, unless `is_in_place`.
-// cub_spoils() declares an output with undefined contents and fills it with junk.
+// the storage is a violation. An output that overlaps an input is also a violation, unless
+// `is_in_place`. cub_spoils() declares an output with undefined contents and fills it with junk.
 void cub_reads(const void* p, size_t bytes);
 void cub_writes(void* p, size_t bytes, bool is_in_place = false);
 void cub_spoils(void* p, size_t bytes);

@@ -128,8 +128,8 @@ TEST_F(CacheTest, DamageLimitAndLeftovers) {
   EXPECT_LE(bytes, limited.run.cache_bytes);
 }
 
-// Until it is destroyed, damages random entries of a cache, or replaces them with links, pipes,
-// folders and entries of other subvolumes.
+// Damages random entries of a cache, or replaces them with links, pipes, folders and entries of
+// other subvolumes, until this object is destroyed.
 class CacheAttack {
  public:
   CacheAttack(std::filesystem::path folder, unsigned seed)

@@ -94,8 +94,8 @@ TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// Other processes see a subvolume that is built but not recorded as planned. A subvolume that is
-// marked for rebuild is planned for all processes.
+// If a subvolume is built but not recorded, it is still planned for other processes. A subvolume
+// that is marked for rebuild is planned for all processes.
 TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));

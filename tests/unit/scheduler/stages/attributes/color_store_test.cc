@@ -105,8 +105,8 @@ TEST_F(ColorStoreTest, HasArtifactsInParts) {
     ColorStore store = open();
     EXPECT_FALSE(store.has(a_));
     EXPECT_EQ(read(store, b_), bytes_of("two parts"));
-    // An earlier run has stored two parts of a_, but not its last part. They are ignored, and a_
-    // begins again with part 0.
+    // An earlier run has stored two parts of a_, but not its last part. The store ignores these
+    // parts, so a_ begins again with part 0.
     for (uint64_t i = 0; i < 3; ++i) store.add(a_, i, i == 2, bytes_of("abc"));
   }
   EXPECT_EQ(read(open(), a_), bytes_of("abcabcabc"));

@@ -146,7 +146,7 @@ TEST_P(IngestTest, ATriangleFromTooFarIsNamed) {
   const Error error = error_of_ingest([] {});
   EXPECT_EQ(error.code(), ErrorCode::kLimit);
   // The error counts only valid triangles. 820 invalid triangles are omitted before triangle 81927,
-  // the one that is too far away, so the error names triangle 81107.
+  // which is too far away, so the error names triangle 81107.
   EXPECT_NE(error.message().find("triangle 81107 of the scene"), std::string::npos)
       << error.message();
 }

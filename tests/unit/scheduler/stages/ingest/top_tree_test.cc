@@ -258,8 +258,8 @@ TEST(TopTree, TalliesAddUp) {
   }
 }
 
-// A top tree that begins with the cells of another top tree, as after a resumed ingest, gives the
-// same plans as an uninterrupted one.
+// If a top tree begins with the cells of another top tree, as when ingest resumes, it gives the
+// same plans as a single top tree that counts all triangles.
 TEST(TopTree, ContinuesFromTheCellsOfAnother) {
   MemoryBudget budget(uint64_t{1} << 30);
   std::mt19937_64 random(4);

@@ -91,8 +91,8 @@ TEST_F(CutoutCheckpointTest, NoticesAChangeOfAnImage) {
 }
 
 // A build begins while the leaf's texture is missing, so it keeps the complete surfaces of the
-// leaf. If the texture appears before the build resumes, the result equals that of a build that had
-// the texture from the beginning.
+// leaf. If the texture appears before the build resumes, the result is the same as if the texture
+// had been present from the beginning.
 TEST_F(CutoutCheckpointTest, NoticesANewImage) {
   const std::string image = folder_.file("leaf.png"), other = folder_.file("other.png");
   std::filesystem::rename(image, other);

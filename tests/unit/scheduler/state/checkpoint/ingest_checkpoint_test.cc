@@ -120,8 +120,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   }
 }
 
-// A build may be resumed with other run options. Subvolumes may then be split that were already
-// planned or built; their triangles are found without reading the scene again.
+// A build may be resumed with other run options. These may require that subvolumes are split that
+// an earlier run has planned or built. The build then does not read the scene again.
 TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
@@ -194,8 +194,8 @@ TEST_F(IngestCheckpointTest, NoticesAChangeInPlace) {
   }
 }
 
-// If a buffer in a separate file was touched after an interruption, the resumed build reads it
-// again.
+// If the times of a scene's separate buffer file have changed since an interruption, the resumed
+// build reads this file again.
 TEST_F(IngestCheckpointTest, NoticesAChangeOfABuffer) {
   const std::string glb = read_small_file(system_files(), scene(), UINT64_MAX);
   uint32_t json_size = 0;
@@ -288,9 +288,9 @@ TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
   EXPECT_FALSE(files_.bytes_written.contains(durable()));
 }
 
-// trusted_from_ns() returns the time from which the times of the files identify their contents. It
-// is later than the times by a tick of the file system's clock, because a write within the same
-// tick would not change them.
+// trusted_from_ns() returns the time after which every change of a file also changes the file's
+// times. This is one tick of the file system's clock after the last of these times, because a
+// change within the same tick would not change them.
 TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {
