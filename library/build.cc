@@ -26,6 +26,7 @@ BuildSpec spec_of(const BuildOptions& options) {
   geometry.columns = options.columns;
   geometry.ignore_extension = options.ignore_extension;
   geometry.hash_bits = options.hash_bits;
+  geometry.order = options.order;
   geometry.solid = options.solid;
   geometry.seed = options.seed;
   geometry.radius = options.radius;

@@ -23,6 +23,7 @@
 #include "scheduler/stages/merge/merge_stage.h"
 #include "scheduler/stages/plan/estimate.h"
 #include "scheduler/stages/publish/publish_stage.h"
+#include "scheduler/stages/reorder/reorder_stage.h"
 #include "scheduler/state/full_disk_advice.h"
 #include "scheduler/state/job/build_job.h"
 
@@ -57,6 +58,7 @@ void prepare_work_folder(BuildJob& job) {
   if (job.start_over) {
     job.checkpoint.forget();
     job.work.remove_colors();
+    job.work.remove_merged();
     job.work.remove_rows();
     job.work.remove_filled();
     remove_tasks(job);
@@ -264,8 +266,17 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   return true;
 }
 
-// Runs the stages merge, attributes and publish, from the artifacts to the output file. Returns
-// false if it found damage and recover() succeeded. Then the caller must build the planned
+// Runs the stages merge and reorder: writes all levels to `out`.
+void write_levels(BuildJob& job, GlobalFileWriter& out) {
+  if (job.spec.geometry.order == OrderName::kHash) return merge_artifacts(job, out);
+  GlobalFileWriter merged(job.context.files, job.work.merged_path(), job.report.grid,
+                          job.report.hash_bits);
+  merge_artifacts(job, merged);
+  reorder_levels(job, merged, out);
+}
+
+// Runs the stages merge, reorder, attributes and publish, from the artifacts to the output file.
+// Returns false if it found damage and recover() succeeded. Then the caller must build the planned
 // subvolumes and call this function again.
 bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   AttributeSections attributes(job);
@@ -275,11 +286,12 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     enclose(job);
     GlobalFileWriter out(job.context.files, job.report.output, job.report.grid,
                          job.report.hash_bits);
-    merge_artifacts(job, out);
+    write_levels(job, out);
     reads_scene = true;
     attributes.add_to(out);
     reads_scene = false;
     publish(job, out, attributes);
+    job.work.remove_merged();
     return true;
   } catch (const Error& error) {
     // DamagedTriangles reports damage of a spill file in the work folder, not of the scene. The

@@ -44,6 +44,10 @@ enum class CutoutRule { kDefault, kSkip, kKeep };
 // kNone fills nothing: only voxels that the surface touches are set.
 enum class SolidName { kNone, kWinding, kParity, kEnclosed };
 
+// The order of the nodes in the levels of the file (docs/format.md, "Node order"). kFirstParent is
+// faster to read; kHash can be combined with other files.
+enum class OrderName { kHash, kFirstParent };
+
 struct BuildOptions {
   // The scene: files (glTF 2.0, PLY, OBJ, STL, LAS, text with points), a mesh in memory, or both.
   // The files and the mesh form one scene.
@@ -72,6 +76,7 @@ struct BuildOptions {
   bool thin = false;
   CutoutRule cutouts = CutoutRule::kDefault;
   uint32_t hash_bits = 64;  // bits of the node hash, 4 to 64
+  OrderName order = OrderName::kHash;
   SolidName solid = SolidName::kNone;
   // For kEnclosed: a point in the units of the scene. If it is set, only the enclosed space around
   // this point is filled.

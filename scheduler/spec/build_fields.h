@@ -50,6 +50,7 @@ void fields(Visitor& visit, GeometryOptions& g) {
   visit(kResolutionField, g.resolution);
   visit(option("hash_bits", "bits of a node's hash that count").range(4, 64).key(true),
         g.hash_bits);
+  visit(option("order", "order of the nodes: hash, or first-parent for faster reading"), g.order);
   visit(option("solid", "fill the interior by this rule (docs/solid.md)")
             .unset_means("fill nothing")
             .or_unset(),

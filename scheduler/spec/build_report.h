@@ -36,6 +36,7 @@ struct BuildReport {
   Grid grid;
   uint32_t hash_bits = 64;
   VoxelRule rule = VoxelRule::kShell;
+  OrderName node_order = OrderName::kHash;
   uint64_t bytes = 0;
   MergeReport merge;
   uint64_t triangles = 0;  // triangles that may touch the grid

@@ -33,6 +33,7 @@ constexpr std::array<const char*, 3> enum_names(CutoutRule) { return {"", "skip"
 constexpr std::array<const char*, 4> enum_names(SolidName) {
   return {"", "winding", "parity", "enclosed"};
 }
+constexpr std::array<const char*, 2> enum_names(OrderName) { return {"hash", "first-parent"}; }
 enum class ClusterEngine { kNone, kSlurm };
 constexpr std::array<const char*, 2> enum_names(ClusterEngine) { return {"", "slurm"}; }
 
@@ -49,6 +50,7 @@ struct GeometryOptions {
   std::string columns;                        // names of the columns of text files with points
   std::vector<std::string> ignore_extension;  // required glTF extensions to ignore
   uint32_t hash_bits = 64;
+  OrderName order = OrderName::kHash;  // the order of the nodes in each level
   SolidName solid = SolidName::kNone;  // the rule that fills the interior
   // A point in scene units. If it is set, only its enclosed space is filled.
   std::optional<std::array<double, 3>> seed;

@@ -96,6 +96,7 @@ void fields(Visitor& visit, BuildReport& report) {
   visit_grid(visit, report.grid);
   visit("hash_bits", report.hash_bits);
   visit("rule", report.rule);
+  visit("node_order", report.node_order);
   visit("voxels", report.merge.voxels);
   visit("svo_nodes", report.merge.svo_nodes);
   visit("dag_nodes", report.merge.dag_nodes);

@@ -63,7 +63,8 @@ bool is_ours(const DirectoryEntry& entry) {
   if (entry.is_directory) return name == kScratchName || name == kClusterName;
   return name == kLockName || name == "job.db" || name == "job.db-wal" || name == "job.db-shm" ||
          name == "job.db-journal" || name.ends_with(".vdspill") || name.ends_with(".vddurable") ||
-         name.ends_with(".vddurable.partial") || segment_id(name).has_value();
+         name.ends_with(".vddurable.partial") || name == "merged.vdag.partial" ||
+         segment_id(name).has_value();
 }
 
 }  // namespace

@@ -52,6 +52,8 @@ class WorkFolder {
   std::string faces_path() const { return path_ + "/faces.vdspill"; }
   // Colors of cubes that outlive a run.
   std::string colors_path() const { return path_ + "/colors.vddurable"; }
+  // The merge's levels in a build that reorders them. The file has the name with ".partial" added.
+  std::string merged_path() const { return path_ + "/merged.vdag"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   // Folder that a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
@@ -85,6 +87,7 @@ class WorkFolder {
   }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
+  void remove_merged() { remove_silently(merged_path() + ".partial"); }
   // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,
   // because remaining files only cost space.
   void remove();

@@ -39,6 +39,8 @@ constexpr double kMaxDiskBytesPerNode = 40;
 // CPU time per DAG node of a build, divided by the CPU time per DAG node of its pilot. Measured on
 // real scenes.
 constexpr double kBuildOverPilotTime = 1.5;
+// CPU time of a build that reorders its nodes, over the time of a build that does not.
+constexpr double kReorderTime = 1.3;
 // Upper bound of the cells per brick. A surface that crosses a brick sets about 16 of its voxels.
 constexpr double kMaxCellsPerBrick = 32;
 // Bytes of the work files with sample rows, per byte of the uncompressed rows. Measured on real
@@ -272,6 +274,9 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
       estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
+  // The merge's file and the nodes that are being reordered.
+  if (options.order != OrderName::kHash)
+    estimate.disk_bytes = estimate.disk_bytes + 2.0 * estimate.file_bytes;
   // With cutouts, patches can replace a triangle, so there can be more records than triangles.
   const uint64_t records =
       std::max(scene.state.counts.triangles, scene.triangles->count(kSceneBin));
@@ -289,6 +294,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
     *figure = std::min(*figure, static_cast<double>(budget.limit())) + kBaseMemoryBytes;
   const double growth = last.dag_nodes > 0 ? nodes / last.dag_nodes : 1;
   estimate.cpu_s = within(last.cpu_s * growth * kBuildOverPilotTime, 1.5 * spread);
+  if (options.order != OrderName::kHash) estimate.cpu_s = kReorderTime * estimate.cpu_s;
   if (options.attributes.any()) {
     const int color_doublings = static_cast<int>(levels_of_resolution(options.color_resolution)) -
                                 static_cast<int>(last.levels);

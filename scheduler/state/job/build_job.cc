@@ -46,6 +46,7 @@ BuildJob::BuildJob(const BuildSpec& spec_of_build, BuildScene& scene_of_build,
   report.scenes = reported_scenes(spec);
   report.hash_bits = spec.geometry.hash_bits;
   report.rule = spec.geometry.rule();
+  report.node_order = spec.geometry.order;
   report.threads = spec.run.threads;
   report.memory_bytes = spec.run.memory_bytes;
 }

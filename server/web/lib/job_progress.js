@@ -10,6 +10,7 @@ const kStages = [
   {name: "build", share: 60, applies: () => true},
   {name: "interior", share: 20, applies: (options) => Boolean(options.solid)},
   {name: "merge", share: 25, applies: () => true},
+  {name: "reorder", share: 25, applies: (options) => options.order === "first-parent"},
   {name: "color", share: 140, applies: (options) => Boolean(options.color || options.attributes)},
   {name: "write", share: 5, applies: () => true},
 ];

@@ -46,6 +46,7 @@ class Fields {
       ]),
       seed: h("input", {placeholder: "X,Y,Z", autocomplete: "off", on}),
       radius: this.number({min: "0", max: "16", step: "1", placeholder: "0"}),
+      order: this.choice([["", "By hash"], ["first-parent", "By first parent"]]),
       color_resolution: this.choice([kAutomatic, ...gridChoices(kMinLevel, kMaxLevel)]),
       hash_bits: this.number({min: "4", max: "64", step: "1", placeholder: "64"}),
       memory: h("input", {placeholder: "2GiB", autocomplete: "off", on}),
@@ -112,6 +113,7 @@ export class JobOptions {
         checkRow(flags.skip_invalid, "Skip invalid triangles"), checkRow(flags.thin, "Thin voxels"),
         checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
+        field("Node order", options.order, "By first parent: faster to view."),
         field("Hash bits", options.hash_bits));
   }
 

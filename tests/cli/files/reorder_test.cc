@@ -109,6 +109,23 @@ TEST_F(Reorder, CommandsThatNeedTheOrderByHash) {
   EXPECT_EQ(pasted["sha256"], run_json({"info", "plain.vdag", "--digest"})["sha256"]);
 }
 
+// A build with --order equals a build that is reordered, also with attributes. A work folder of
+// another order is refused.
+TEST_F(Reorder, Builds) {
+  const Json plain = run_json({"build", "c.glb", "-r", "64", "-o", "x.vdag", "--order",
+                               "first-parent", "--memory", "64MiB", "--keep-work"});
+  EXPECT_TRUE(contents("x.vdag") == contents("plain_first.vdag"));
+  EXPECT_EQ(plain["node_order"], "first-parent");
+  EXPECT_EQ(plain["sha256"], run_json({"info", "x.vdag", "--digest"})["sha256"]);
+  const Json again = run_json({"build", "c.glb", "-r", "64", "-o", "x.vdag", "--order",
+                               "first-parent", "--memory", "64MiB", "--keep-work"});
+  EXPECT_EQ(again["sha256"], plain["sha256"]);
+  expect_error(2, "order", {"build", "c.glb", "-r", "64", "-o", "x.vdag", "--keep-work"});
+  run_json({"build", "c.glb", "-r", "64", "-o", "y.vdag", "--attributes",
+            "color,alpha,normal,material", "--order", "first-parent"});
+  EXPECT_TRUE(contents("y.vdag") == contents("first.vdag"));
+}
+
 TEST_F(Reorder, ReportAndRefusals) {
   const Json report =
       run_json({"reorder", "hash.vdag", "-o", "x.vdag", "--memory", "64MiB", "--threads", "1"});

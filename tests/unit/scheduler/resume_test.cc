@@ -129,6 +129,50 @@ TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   }
 }
 
+// Also in a build that reorders the nodes. The merge resumes its own file, which is removed at the
+// end even if the work folder is kept.
+TEST_F(ResumeTest, ResumesABuildThatReordersTheNodes) {
+  BuildSpec ordered = spec();
+  ordered.geometry.order = OrderName::kFirstParent;
+  ordered.run.checkpoint_interval_s = 0;
+  ordered.run.keep_work = true;
+  const BuildReport whole = build(ordered);
+  EXPECT_EQ(whole.node_order, OrderName::kFirstParent);
+  const auto has_name = [](const StageTime& stage) { return stage.name == "reorder"; };
+  EXPECT_EQ(std::ranges::count_if(whole.stages, has_name), 1);
+  const std::string merged = work() + "/merged.vdag.partial";
+  EXPECT_FALSE(std::filesystem::exists(merged));
+  for (const auto& [stage, after] : {std::pair("build", 5), std::pair("merge", 1),
+                                     std::pair("reorder", 0), std::pair("reorder", 1)}) {
+    SCOPED_TRACE(stage);
+    std::filesystem::remove(output());
+    std::filesystem::remove_all(work());
+    build_until(ordered, stage, static_cast<uint64_t>(after));
+    EXPECT_EQ(std::filesystem::exists(merged), std::string(stage) == "reorder");
+    StageRecord resumed;
+    EXPECT_EQ(build(ordered, resumed).sha256, whole.sha256);
+    EXPECT_EQ(resumed.stages.at("merge").resumed_at > 0, std::string(stage) == "reorder");
+    EXPECT_FALSE(std::filesystem::exists(merged));
+  }
+}
+
+// A damaged file of the merge is merged again, from artifacts that are intact.
+TEST_F(ResumeTest, MergesAgainIfTheFileToReorderIsDamaged) {
+  BuildSpec ordered = spec();
+  ordered.geometry.order = OrderName::kFirstParent;
+  ordered.run.checkpoint_interval_s = 0;
+  const std::string expected = build(ordered).sha256;
+  std::filesystem::remove(output());
+  build_until(ordered, "reorder", 0);
+  const std::string merged = work() + "/merged.vdag.partial";
+  {
+    std::fstream file(merged, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(std::filesystem::file_size(merged) / 2));
+    file.write("damage", 6);
+  }
+  EXPECT_EQ(build(ordered).sha256, expected);
+}
+
 // A build with a different scene, resolution or number of hash bits does not resume the job in the
 // work folder: it fails, and the error names the difference. With `restart`, it starts over. Run
 // options may differ.

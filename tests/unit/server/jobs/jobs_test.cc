@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   const JobRequest request = parse_job_request(R"({
       "scene": ["a.glb", "/srv/b.gltf"], "resolution": 4096, "name": "n", "priority": -3,
-      "options": {"bounds": [0, -1.5, 2, 8], "skip_invalid": true, "hash_bits": 16,
+      "options": {"bounds": [0, -1.5, 2, 8], "skip_invalid": true, "hash_bits": 16, "order": "first-parent",
                   "ignore_extension": ["ACME_bent", "ACME_twisted"],
                   "attributes": ["normal", "material"], "color_resolution": 64,
                   "memory": "2GiB", "threads": 2, "subvolume": 512, "backend": "cpu",
@@ -39,6 +39,7 @@ TEST(JobRequestBody, HasTheOptionsOfTheCommandLine) {
   EXPECT_EQ(g.bounds, (std::array<double, 4>{0, -1.5, 2, 8}));
   EXPECT_TRUE(g.skip_invalid);
   EXPECT_EQ(g.hash_bits, 16u);
+  EXPECT_EQ(g.order, OrderName::kFirstParent);
   EXPECT_EQ(g.ignore_extension, (std::vector<std::string>{"ACME_bent", "ACME_twisted"}));
   EXPECT_EQ(g.attributes, (AttributeSet{Attribute::kNormal, Attribute::kMaterial}));
   EXPECT_EQ(g.color_resolution, 64u);
