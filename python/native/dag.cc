@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "core/base/process_limits.h"
+#include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
 #include "python/native/path_text.h"
@@ -223,6 +224,10 @@ void bind_dag(nb::module_& module) {
              new (dag) query::DagFile(path.bytes);
            })
       .def_prop_ro("grid_levels", &query::DagFile::grid_levels)
+      .def_prop_ro("node_order",
+                   [](const query::DagFile& dag) {
+                     return std::string(name_of(NodeOrder{dag.file().node_order()}));
+                   })
       .def_prop_ro("voxels", [](const query::DagFile& dag) { return dag.file().voxels(); })
       .def_prop_ro("edge", [](const query::DagFile& dag) { return dag.file().edge(); })
       .def_prop_ro("origin",

@@ -18,6 +18,7 @@
 #include "query/combine/combine.h"
 #include "query/export/export.h"
 #include "query/extract/extract.h"
+#include "query/reorder/reorder.h"
 
 namespace voxdag::python {
 namespace {
@@ -138,6 +139,32 @@ void combine(const PathText& a, const PathText& b, const std::string& operation,
   });
 }
 
+NodeOrder node_order_named(const std::string& name) {
+  for (const NodeOrder order : {NodeOrder::kByFirstParent, NodeOrder::kByHash})
+    if (name == name_of(order)) return order;
+  throw Error(ErrorCode::kInvalidInput, "order '" + name + "': expected first-parent or hash");
+}
+
+std::string reorder(const PathText& path, const PathText& output, const std::string& order,
+                    const std::string& memory, unsigned threads, bool replace,
+                    nb::object progress) {
+  query::ReorderSpec spec;
+  spec.order = node_order_named(order);
+  spec.output = output.bytes;
+  spec.replace = replace;
+  spec.memory_bytes = memory_of(memory);
+  spec.threads = threads ? threads : default_threads();
+  return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
+    const auto file = open_global_file(path.bytes);
+    const query::ReorderReport report = query::reorder(*file, spec, system_files(), relay, cancel);
+    return nlohmann::json{{"node_order", order},
+                          {"dag_nodes", file->dag_nodes()},
+                          {"bytes", report.bytes},
+                          {"sha256", report.sha256}}
+        .dump();
+  });
+}
+
 // Returns the paths of the files that an export to `output` writes. Some formats write several
 // files.
 std::vector<PathText> export_paths(const std::string& format, const PathText& output) {
@@ -167,6 +194,8 @@ void bind_derive(nb::module_& module) {
   module.def("combine", &combine, nb::arg("a"), nb::arg("b"), nb::arg("operation"),
              nb::arg("output"), nb::arg("offset").none(), nb::arg("clip"), nb::arg("memory"),
              nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
+  module.def("reorder", &reorder, nb::arg("path"), nb::arg("output"), nb::arg("order"),
+             nb::arg("memory"), nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export_paths", &export_paths, nb::arg("format"), nb::arg("output"));
   module.def("export_formats", &export_formats);
 }

@@ -7,20 +7,20 @@
         dag.dense(region, level=8)              # a region of the grid with 2^8 cells per edge
 
 Long calls release the interpreter's lock, so other Python threads can run. build(), plan(),
-combine(), extract(), export() and render() stop on Ctrl-C. If a function fails, it raises
-`voxdag.Error`, whose attribute `code` names the kind of the error.
+combine(), extract(), reorder(), export() and render() stop on Ctrl-C. If a function fails, it
+raises `voxdag.Error`, whose attribute `code` names the kind of the error.
 """
 
 from ._build import Scene, build, plan
 from ._dag import Dag, Hits, open
-from ._derive import combine, export, export_formats, extract
+from ._derive import combine, export, export_formats, extract, reorder
 from ._error import Error
 from ._mesh import Mesh
 from ._notebook import Viewer
 from ._progress import Progress
 from ._render import render
 from ._reports import BuildReport
-from ._types import Estimate, ExportReport, ExtractReport, Region
+from ._types import Estimate, ExportReport, ExtractReport, NodeOrder, Region, ReorderReport
 from ._voxels import from_dense, from_points, from_voxels
 
 __all__ = [
@@ -32,8 +32,10 @@ __all__ = [
     "ExtractReport",
     "Hits",
     "Mesh",
+    "NodeOrder",
     "Progress",
     "Region",
+    "ReorderReport",
     "Scene",
     "Viewer",
     "build",
@@ -47,5 +49,6 @@ __all__ = [
     "open",
     "plan",
     "render",
+    "reorder",
 ]
 __version__ = "0.1.0"

@@ -20,7 +20,15 @@ if TYPE_CHECKING:
 
     from ._derive import Operation
     from ._notebook import Viewer
-    from ._types import ExportOptions, ExportReport, ExtractOptions, ExtractReport, RenderOptions
+    from ._types import (
+        ExportOptions,
+        ExportReport,
+        ExtractOptions,
+        ExtractReport,
+        RenderOptions,
+        ReorderOptions,
+        ReorderReport,
+    )
 
 # For each attribute's name: the number of components of a value, and the numpy type of a component.
 # int64 values are indexes of material_names; -1 means that the cell is not set.
@@ -355,6 +363,13 @@ class Dag(DagFile):
         from ._derive import export
 
         return export(self, output, **options)
+
+    def reorder(self, output: Path, **options: Unpack[ReorderOptions]) -> ReorderReport:
+        """Writes a copy of this file with its nodes in another order. Takes the options of
+        voxdag.reorder() and returns its report."""
+        from ._derive import reorder
+
+        return reorder(self, output, **options)
 
     def render(self, **options: Unpack[RenderOptions]) -> Bytes:
         """Renders a picture of this file, as an array (height, width, 3 or 4) of uint8. Takes the

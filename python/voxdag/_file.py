@@ -94,6 +94,11 @@ class DagFile:
         return self._dag.voxels
 
     @property
+    def node_order(self) -> str:
+        """The order of the nodes in the file: "hash" or "first-parent". See voxdag.reorder()."""
+        return self._dag.node_order
+
+    @property
     def voxel_size(self) -> float:
         """The length of a voxel's edge, in the units of the scene."""
         return self._dag.edge / self.resolution

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TypedDict, Union
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 # A box of cells: a sequence or an array of six numbers. The first three are x, y, z of the low
 # corner, which is in the region. The last three are x, y, z of the high corner, which is not.
 Region = Union[Sequence[Any], NDArray[Any]]
+
+
+# The order of the nodes in a file.
+NodeOrder = Literal["hash", "first-parent"]
 
 
 class Range(TypedDict):
@@ -124,6 +128,21 @@ class ExportReport(TypedDict):
     facts: dict[str, float | list[float]]
 
 
+class ReorderReport(TypedDict):
+    """The dict that reorder() returns. It describes the new file.
+
+    node_order   order of the nodes
+    dag_nodes    number of nodes of the DAG
+    bytes        size of the file in bytes
+    sha256       SHA-256 of the file, as a hexadecimal number
+    """
+
+    node_order: NodeOrder
+    dag_nodes: int
+    bytes: int
+    sha256: str
+
+
 class ExtractOptions(TypedDict, total=False):
     """Options of extract()."""
 
@@ -153,6 +172,16 @@ class ExportOptions(TypedDict, total=False):
     compact: bool
     outside: bool
     watertight: bool
+    force: bool
+    progress: Progress
+
+
+class ReorderOptions(TypedDict, total=False):
+    """Options of reorder()."""
+
+    order: NodeOrder
+    memory: int | str | None
+    threads: int
     force: bool
     progress: Progress
 
