@@ -16,6 +16,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "voxdag package";
 constexpr int kVersion = 1;
+// Maximum depth of nested values in package.json, because formatting nested JSON recurses.
+constexpr int kMaxDepth = 32;
+constexpr size_t kMaxBands = 2 * (size_t{kMaxGridLevels} + 1);
 constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // integers up to this are exact in JavaScript
 
 Json file_json(const PackageFile& file, bool is_pack) {
@@ -37,7 +40,13 @@ class Parser {
   explicit Parser(const std::string& path) : path_(path) {}
 
   PackageIndex parse(std::string_view text) const {
-    const Json json = Json::parse(text, nullptr, false);
+    bool is_too_deep = false;
+    const auto limit_depth = [&](int depth, Json::parse_event_t, Json&) {
+      is_too_deep |= depth > kMaxDepth;
+      return depth <= kMaxDepth;
+    };
+    const Json json = Json::parse(text, limit_depth, false);
+    expect(!is_too_deep, "the text", "a depth of at most " + std::to_string(kMaxDepth));
     expect(json.is_object() && json.value("format", Json()) == kFormat, "'format'",
            std::string("'") + kFormat + "'");
     if (json.value("version", Json()) != kVersion)
@@ -48,6 +57,7 @@ class Parser {
     expect(manifest.is_object(), "'manifest'", "an object");
     index.manifest = manifest.dump();
     for (const Json& band : list(json, "bands")) index.bands.push_back(band_of(band));
+    expect(index.bands.size() <= kMaxBands, "'bands'", "at most two bands of each level");
     const Json& directory = member(json, "directory");
     index.directory = file_of(directory);
     for (const Json& page : list(directory, "pages"))
@@ -108,6 +118,8 @@ class Parser {
     for (const PackageBand& band : index.bands) of_bands += band.blocks;
     for (const PackageFile& pack : index.packs) of_packs += pack.blocks;
     for (const DirectoryPage& page : index.pages) {
+      expect(page.bytes <= index.directory.bytes - of_pages, "'pages'",
+             "the sizes of the directory's pages");
       of_pages += page.bytes;
       expect(page.pack < index.packs.size(), "'pack'", "the number of a pack");
     }

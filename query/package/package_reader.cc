@@ -48,7 +48,7 @@ PackageReader::PackageReader(FileSystem& files, const std::string& folder)
     corrupt(path, "'levels' of the manifest is " + levels.dump() +
                       ": expected a whole number from " + std::to_string(kBrickLevels) + " to " +
                       std::to_string(kMaxGridLevels));
-  if (manifest.value("tile_levels", 0) != static_cast<int>(kPackageTileLevels))
+  if (manifest.value("tile_levels", nlohmann::json()) != kPackageTileLevels)
     corrupt(path, "'tile_levels' of the manifest: expected " + std::to_string(kPackageTileLevels));
   grid_levels_ = levels.get<uint32_t>();
   for (const PackageBand& band : index_.bands)

@@ -153,6 +153,8 @@ void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next
   const auto old = [&](size_t i) { return is_old[i / 8] >> i % 8 & 1; };
   size_t old_count = 0;
   for (size_t i = 0; i < leaves.size(); ++i) old_count += static_cast<size_t>(old(i));
+  for (size_t i = leaves.size(); i < 8 * is_old.size(); ++i)
+    if (old(i)) refuse_block("expected no references after the last leaf");
   const std::vector<uint64_t> distances = columns.take_numbers(4, old_count);
   size_t at = 0;
   for (size_t i = 0; i < leaves.size(); ++i) {

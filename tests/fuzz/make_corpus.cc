@@ -11,7 +11,11 @@
 #include "core/format/artifact/artifact_index.h"
 #include "core/format/artifact/frame_codec.h"
 #include "core/format/global/global_layout.h"
+#include "core/format/global/open_global.h"
 #include "merge/checkpoint/merge_state.h"
+#include "query/package/gzip_block.h"
+#include "query/package/package_index.h"
+#include "query/package/write_package.h"
 #include "scheduler/state/checkpoint/ingest_record.h"
 #include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
@@ -179,6 +183,61 @@ void add_colored_files(const Corpus& corpus) {
   }
 }
 
+// Returns a section of a complete package: the bytes after their size.
+std::string section_of(const std::string& bytes) {
+  const auto size = static_cast<uint32_t>(bytes.size());
+  return std::string(reinterpret_cast<const char*>(&size), sizeof size) + bytes;
+}
+
+// Adds the package in `folder`, its index, and the last block of each of its bands.
+void add_package(const Corpus& corpus, const std::string& name, const std::string& folder,
+                 uint32_t grid_levels) {
+  constexpr size_t kMaxBytes = size_t{1} << 20;
+  const std::string text = read_bytes(folder + "/package.json");
+  const query::PackageIndex index = query::parse_index(text, folder);
+  const std::string page =
+      query::gunzip_block(read_bytes(folder + "/" + index.directory.name), kMaxBytes);
+  std::string packs, complete = section_of(text) + section_of(page);
+  for (const query::PackageFile& pack : index.packs) packs += read_bytes(folder + "/" + pack.name);
+  size_t block = 0, offset = 0;
+  for (const query::PackageBand& band : index.bands) {
+    std::string plain;
+    for (uint64_t i = 0; i < band.blocks; ++i, ++block) {
+      uint16_t size = 0;
+      std::memcpy(&size, page.data() + sizeof size * block, sizeof size);
+      const std::string packed = packs.substr(offset, size);
+      if (block == 0) corpus.add("package", name + "_gzip", "\x03" + packed);
+      plain = query::gunzip_block(packed, kMaxBytes);
+      complete += section_of(plain);
+      offset += size;
+    }
+    const std::string numbers = {static_cast<char>(grid_levels - 3), static_cast<char>(band.level),
+                                 static_cast<char>((band.items - 1) % query::kBlockTiles)};
+    corpus.add("package",
+               name + (band.is_color ? "_colors_" : "_tiles_") + std::to_string(band.level),
+               band.is_color ? "\x02" + plain : "\x01" + numbers + plain);
+  }
+  corpus.add("package", name + "_index", std::string(1, '\0') + text);
+  corpus.add("package", name, "\x04" + complete);
+}
+
+void add_packages(const Corpus& corpus) {
+  TemporaryFolder folder;
+  for (const uint32_t levels : {4u, 6u}) {
+    const std::string name = std::to_string(1 << levels), path = folder.file(name);
+    write_colored(path + ".vdag",
+                  {levels, levels, random_codes(levels, levels, 30), smooth_colors(levels, 9)},
+                  true);
+    const auto file = open_global_file(path + ".vdag");
+    query::PackageSpec spec;
+    spec.output = path;
+    spec.manifest = "{\"levels\":" + std::to_string(levels) + ",\"tile_levels\":2}";
+    NoProgress progress;
+    query::write_package(*file, spec, {}, system_files(), progress, CancelToken());
+    add_package(corpus, name, path, levels);
+  }
+}
+
 void add_records(const Corpus& corpus) {
   const auto without_checksum = [](const std::vector<std::byte>& bytes) {
     return text_of(std::span(bytes).first(bytes.size() - sizeof(uint64_t)));
@@ -280,6 +339,7 @@ int main(int argc, char** argv) {
   voxdag::test::add_artifacts(corpus);
   voxdag::test::add_global_files(corpus);
   voxdag::test::add_colored_files(corpus);
+  voxdag::test::add_packages(corpus);
   voxdag::test::add_records(corpus);
   voxdag::test::add_images(corpus);
   voxdag::test::add_requests(corpus);

@@ -242,6 +242,24 @@ TEST_F(Package, RefusesChangedIndexes) {
   }
   write_bytes(file, "{}");
   EXPECT_THAT(check_error("p"), testing::HasSubstr("'format': expected 'voxdag package'"));
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string changed = intact;
+    changed.replace(changed.find(from), from.size(), to);
+    write_bytes(file, changed);
+    return check_error("p");
+  };
+  EXPECT_THAT(replaced("\"tile_levels\":2", "\"tile_levels\":\"2\""),
+              testing::HasSubstr("'tile_levels' of the manifest: expected 2"));
+  EXPECT_THAT(replaced("\"tile_levels\":2", "\"a\":" + std::string(100000, '[')),
+              testing::HasSubstr("expected"));
+  const std::string deep = std::string(50000, '[') + std::string(50000, ']');
+  EXPECT_THAT(replaced("\"tile_levels\":2", "\"tile_levels\":2,\"a\":" + deep),
+              testing::HasSubstr("expected a depth of at most 32"));
+  std::string bands;
+  for (int i = 0; i < 2048; ++i)
+    bands += R"({"level":1,"pages":9007199254740992,"blocks":9007199254740992},)";
+  EXPECT_THAT(replaced("\"bands\":[", "\"bands\":[" + bands),
+              testing::HasSubstr("at most two bands of each level"));
 }
 
 // Decoding a damaged block throws Error{kCorrupt} or returns the right number of tiles.
