@@ -12,6 +12,7 @@
 #include "core/format/global/open_global.h"
 #include "query/package/package_reader.h"
 #include "query/package/write_package.h"
+#include "server/site/poster.h"
 #include "server/site/single_page.h"
 #include "server/site/viewer_site.h"
 #include "server/tiles/manifest.h"
@@ -22,8 +23,9 @@ namespace {
 constexpr uint64_t kMinPackBytes = query::kFirstPackBytes, kMaxPackBytes = uint64_t{1} << 30;
 
 struct PublishCommand {
-  std::string input, output, check, title, memory, pack_size;
-  bool gray = false, single_file = false, force = false, quiet = false, json = false;
+  std::string input, output, check, title, url, memory, pack_size;
+  bool gray = false, no_poster = false, single_file = false, force = false, quiet = false,
+       json = false;
   unsigned threads = default_threads();
 };
 
@@ -33,6 +35,15 @@ std::string title_of(const PublishCommand& command) {
   if (!command.title.empty()) return command.title;
   const std::string name = command.input.substr(command.input.rfind('/') + 1);
   return name.substr(0, name.rfind('.'));
+}
+
+// Returns the URL of the published folder, with a slash at the end, or "" if it is not given.
+std::string url_of(const std::string& url) {
+  if (url.empty()) return "";
+  if (!url.starts_with("https://") && !url.starts_with("http://"))
+    throw Error(ErrorCode::kInvalidInput,
+                "--url " + url + ": expected an address that begins with https:// or http://");
+  return url.ends_with('/') ? url : url + '/';
 }
 
 uint64_t pack_bytes_of(const std::string& text) {
@@ -96,11 +107,13 @@ void check(const PublishCommand& command, CommandContext& context) {
 query::PackageReport write(const PublishCommand& command, const voxdag_reader::File& file,
                            const query::PackageSpec& spec, Progress& progress,
                            CommandContext& context) {
-  const std::string title = title_of(command);
+  const std::string poster =
+      command.no_poster ? "" : server::render_poster(file, spec, progress, context.cancel);
+  const server::PageContents contents{title_of(command), poster, url_of(command.url)};
   if (command.single_file)
-    return server::write_single_page(file, spec, title, command.force, context.files, progress,
+    return server::write_single_page(file, spec, contents, command.force, context.files, progress,
                                      context.cancel);
-  return query::write_package(file, spec, server::viewer_site(title), context.files, progress,
+  return query::write_package(file, spec, server::viewer_site(contents), context.files, progress,
                               context.cancel);
 }
 
@@ -112,6 +125,7 @@ void run(const PublishCommand& command, CommandContext& context) {
   query::PackageSpec spec;
   spec.output = command.output;
   spec.colors = !command.gray;
+  url_of(command.url);  // throws before any work is done
   spec.pack_bytes = pack_bytes_of(command.pack_size.empty() ? "8MiB" : command.pack_size);
   spec.memory_bytes = memory_limit(command.memory);
   spec.threads = command.threads;
@@ -133,6 +147,12 @@ void declare(Command& command, PublishCommand& state) {
   const Option single_file = command.flag("--single-file", state.single_file,
                                           "write one HTML file, which needs no web server");
   command.flag("--force", state.force, "replace an existing file").needs(single_file);
+  command
+      .option("--url", state.url,
+              "address of the published folder: other web sites then show a picture with links")
+      .excludes(single_file);
+  command.flag("--no-poster", state.no_poster,
+               "leave out the picture that the page shows while it loads");
   command.flag("--gray", state.gray, "leave out the colors");
   command.option("--pack-size", state.pack_size,
                  "size of the files with tiles, such as 8MiB, the default");

@@ -6,27 +6,12 @@
 #include "query/dag/locked_outputs.h"
 #include "query/dag/temporary_work.h"
 #include "query/package/package_reader.h"
-#include "server/site/viewer_site.h"
+#include "server/site/base64.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
-
-std::string base64_of(std::string_view bytes) {
-  constexpr const char* kDigits =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t group = 0;
-    for (size_t j = 0; j < 3; ++j)
-      group = group << 8 | (i + j < bytes.size() ? static_cast<unsigned char>(bytes[i + j]) : 0);
-    for (size_t j = 0; j < 4; ++j)
-      text += i + j > bytes.size() ? '=' : kDigits[group >> (18 - 6 * j) & 63];
-  }
-  return text;
-}
 
 // Writes a text file in several parts. finish() returns the size of the file.
 class TextWriter {
@@ -49,12 +34,12 @@ class TextWriter {
 
 // Writes the page to `path`: the page of the viewer, into which the files of the package in the
 // folder `package` are inserted as base64. Returns the size of the page.
-uint64_t write_page(const std::string& package, const std::string& title, const std::string& path,
-                    FileSystem& files, const CancelToken& cancel) {
+uint64_t write_page(const std::string& package, const PageContents& contents,
+                    const std::string& path, FileSystem& files, const CancelToken& cancel) {
   const query::PackageIndex index = query::PackageReader(files, package).index();
   std::vector<std::string> names = {query::kIndexName, index.directory.name};
   for (const query::PackageFile& pack : index.packs) names.push_back(pack.name);
-  const std::string page = page_with_module(title), end = "</body>";
+  const std::string page = page_with_module(contents), end = "</body>";
   const size_t data = page.rfind(end);
   TextWriter out(files, path);
   out.add(page.substr(0, data));
@@ -71,8 +56,9 @@ uint64_t write_page(const std::string& package, const std::string& title, const 
 }  // namespace
 
 query::PackageReport write_single_page(const voxdag_reader::File& file, query::PackageSpec spec,
-                                       const std::string& title, bool replace, FileSystem& files,
-                                       Progress& progress, const CancelToken& cancel) {
+                                       const PageContents& contents, bool replace,
+                                       FileSystem& files, Progress& progress,
+                                       const CancelToken& cancel) {
   const std::string output = spec.output, partial = output + ".partial";
   query::LockedOutputs outputs(files, {{output}, {file.path()}, replace});
   const query::TemporaryWork work(files, output + ".work-");
@@ -83,7 +69,7 @@ query::PackageReport write_single_page(const voxdag_reader::File& file, query::P
                                        " bytes, expected at most " +
                                        std::to_string(kMaxSinglePageBytes) + " with --single-file");
   try {
-    report.bytes = write_page(spec.output, title, partial, outputs.files(), cancel);
+    report.bytes = write_page(spec.output, contents, partial, outputs.files(), cancel);
     outputs.files().rename(partial, output);
   } catch (const Error&) {
     if (files.exists(partial)) files.remove(partial);

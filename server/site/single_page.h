@@ -7,6 +7,7 @@
 
 #include "core/io/file_system.h"
 #include "query/package/write_package.h"
+#include "server/site/viewer_site.h"
 
 namespace voxdag::server {
 
@@ -14,11 +15,12 @@ namespace voxdag::server {
 // complete file before it can show the first picture.
 inline constexpr uint64_t kMaxSinglePageBytes = uint64_t{256} << 20;
 
-// Writes the HTML file spec.output with the title `title`, and returns its report. Replaces an
-// existing file only if `replace` is true. Throws the errors of write_package() and LockedOutputs,
-// and Error{kLimit} if the package is larger than kMaxSinglePageBytes.
+// Writes the HTML file spec.output, and returns its report. Replaces an existing file only if
+// `replace` is true. Throws the errors of write_package() and LockedOutputs, and Error{kLimit} if
+// the package is larger than kMaxSinglePageBytes.
 query::PackageReport write_single_page(const voxdag_reader::File& file, query::PackageSpec spec,
-                                       const std::string& title, bool replace, FileSystem& files,
-                                       Progress& progress, const CancelToken& cancel);
+                                       const PageContents& contents, bool replace,
+                                       FileSystem& files, Progress& progress,
+                                       const CancelToken& cancel);
 
 }  // namespace voxdag::server

@@ -4,7 +4,9 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "server/site/base64.h"
 #include "server/site/module_bundle.h"
+#include "server/site/poster.h"
 #include "server/web/assets.h"
 
 namespace voxdag::server {
@@ -43,13 +45,14 @@ bool is_of_service(const std::string& line) {
 }
 
 // Returns viewer.html without the lines for which is_of_service() is true. Inserts `head` at the
-// end of its element <head>.
-std::string page_with_head(const std::string& head) {
+// end of its element <head>, and `poster` over the picture.
+std::string page_of(const std::string& head, const std::string& poster) {
   std::istringstream lines(asset("viewer.html"));
   std::string page;
   for (std::string line; std::getline(lines, line);) {
     if (is_of_service(line)) continue;
     if (line == "</head>") page += head;
+    if (line.find("id=\"status\"") != line.npos) page += poster;
     page += line + '\n';
   }
   return page;
@@ -74,15 +77,38 @@ std::string percent_encoded(const std::string& text) {
   return result;
 }
 
+// Returns the element that shows the poster until the viewer has drawn (web/viewer/app.js). The
+// other files of the page are more urgent than the poster.
+std::string poster_element(const std::string& url) {
+  if (url.empty()) return "";
+  return "      <img id=\"poster\" class=\"poster\" src=\"" + url +
+         "\" alt=\"\" fetchpriority=\"low\">\n";
+}
+
+// Returns the elements that describe the page to other web sites, which show a preview of it
+// (https://ogp.me). `poster` is the name of the poster's file, or "".
+std::string preview_elements(const PageContents& contents, const std::string& poster) {
+  const auto element = [](const std::string& property, const std::string& content) {
+    return "  <meta property=\"og:" + property + "\" content=\"" + escaped(content) + "\">\n";
+  };
+  std::string elements = element("title", contents.title) + element("type", "website");
+  if (!contents.url.empty()) elements += element("url", contents.url);
+  if (poster.empty()) return elements;
+  return elements + element("image", contents.url + poster) +
+         element("image:width", std::to_string(kPosterWidth)) +
+         element("image:height", std::to_string(kPosterHeight)) +
+         "  <meta name=\"twitter:card\" content=\"summary_large_image\">\n";
+}
+
 // Returns the content of the element <head> for the page of a package. `url` is the URL of the
-// folder of the package (web/viewer/package/published.js). `script` is the element <script> with
-// the viewer.
-std::string head_of(const std::string& title, const std::string& url, const std::string& script) {
+// folder of the package (web/viewer/package/published.js). `elements` are further elements, among
+// them the element <script> with the viewer.
+std::string head_of(const std::string& title, const std::string& url, const std::string& elements) {
   std::string head = "  <title>" + escaped(title) + "</title>\n";
   head += "  <meta name=\"voxdag-package\" content=\"" + url + "\">\n";
   head += "  <link rel=\"icon\" href=\"data:image/svg+xml," + percent_encoded(asset("icon.svg")) +
           "\">\n";
-  head += script + "  <style>\n";
+  head += elements + "  <style>\n";
   for (const char* name : {"app.css", "parts.css", "viewer.css"}) head += asset(name);
   return head + "  </style>\n";
 }
@@ -91,16 +117,27 @@ std::string viewer_module() { return bundle_modules("viewer/package/main.js", as
 
 }  // namespace
 
-std::vector<query::ViewerFile> viewer_site(const std::string& title) {
+std::vector<query::ViewerFile> viewer_site(const PageContents& contents) {
   const std::string module = viewer_module();
   const std::string name = query::hashed_name("viewer", module, ".js");
   const std::string script = "  <script type=\"module\" src=\"" + name + "\"></script>\n";
-  return {{name, module}, {"index.html", page_with_head(head_of(title, "./", script))}};
+  std::vector<query::ViewerFile> files = {{name, module}};
+  std::string poster;
+  if (!contents.poster.empty()) {
+    poster = query::hashed_name("poster", contents.poster, ".png");
+    files.push_back({poster, contents.poster});
+  }
+  const std::string head =
+      head_of(contents.title, "./", preview_elements(contents, poster) + script);
+  files.push_back({"index.html", page_of(head, poster_element(poster))});
+  return files;
 }
 
-std::string page_with_module(const std::string& title) {
+std::string page_with_module(const PageContents& contents) {
   const std::string script = "  <script type=\"module\">\n" + viewer_module() + "</script>\n";
-  return page_with_head(head_of(title, "", script));
+  const std::string poster =
+      contents.poster.empty() ? "" : "data:image/png;base64," + base64_of(contents.poster);
+  return page_of(head_of(contents.title, "", script), poster_element(poster));
 }
 
 }  // namespace voxdag::server

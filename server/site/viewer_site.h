@@ -8,13 +8,23 @@
 
 namespace voxdag::server {
 
-// Returns two files: index.html, and the module with the JavaScript of the viewer. The page has the
-// title `title` and shows the package in its own folder.
-std::vector<query::ViewerFile> viewer_site(const std::string& title);
+// The contents of a page, besides the viewer.
+struct PageContents {
+  std::string title;
+  std::string poster;  // a PNG file (poster.h); "" for no poster
+  // The URL of the published folder, which ends with a slash; "" if it is unknown. Other web sites
+  // find the poster only with this URL.
+  std::string url;
+};
 
-// Returns a page that contains the module of the viewer, for `publish --single-file`. The module
-// reads the files of the package from elements <script type="text/plain" data-file=NAME> in the
-// page, which the caller must insert. These elements contain the bytes of the files in base64.
-std::string page_with_module(const std::string& title);
+// Returns the files of the viewer: index.html, the module with its JavaScript, and the poster. The
+// page shows the package in its own folder.
+std::vector<query::ViewerFile> viewer_site(const PageContents& contents);
+
+// Returns a page that contains the module of the viewer and the poster, for `publish
+// --single-file`. The module reads the files of the package from elements <script
+// type="text/plain" data-file=NAME> in the page, which the caller must insert. These elements
+// contain the bytes of the files in base64.
+std::string page_with_module(const PageContents& contents);
 
 }  // namespace voxdag::server

@@ -181,6 +181,7 @@ def check_camera_text(visitor, voxdag, built, camera):
     size = distance(before["eye"], before["target"])
     assert distance(visitor.camera()["eye"], before["eye"]) < 1e-3 + 1e-6 * size
     assert visitor.camera_text() == text and page.url == address
+    assert "#c=" in address, address
     visitor.open(address)
     assert visitor.camera_text() == text and page.url == address, (
         "the address does not bring the camera back"
@@ -229,6 +230,8 @@ def check_addresses(visitor, resolution, cameras):
         "#camera=1,2,x&target=0,0,0",
         "#camera=1,2,NaN&target=0,0,0",
         "#camera=1,2,3&target=0,0,0&fov=1e9",
+        "#c=1,2,3,0,0",
+        "#c=1,2,3,0,0,0,35,7",
     ):
         page.evaluate(FOLLOW, [None, refused])
         page.locator("#status.bad", has_text="The camera of the address cannot be used.").wait_for()

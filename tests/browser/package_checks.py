@@ -16,6 +16,7 @@ from picture_checks import HEIGHT, MIN_EQUAL_DEPTH, PLAIN, WIDTH, assert_equal, 
 #   refused:    with an error
 HOSTS = ["ranges", "whole", "compressed", "refused"]
 CHECKED_HOSTS = ["ranges", "compressed"]  # to save time
+PUBLIC_URL = "https://example.org/scene"
 RANGE = re.compile(r"bytes=(\d+)-(\d+)$")
 
 
@@ -87,6 +88,22 @@ def check_host(visitor, url, host, camera, reference):
     assert (count > 1) == (host == "ranges"), f"{host}: {count} requests for ranges"
 
 
+def check_poster(visitor, url):
+    """The page shows the poster until the viewer has drawn."""
+    page, scripts = visitor.page, []
+    page.route("**/viewer-*.js", scripts.append)
+    page.goto(f"{url}/", wait_until="commit")
+    visitor.wait_until("document.getElementById('poster')?.naturalWidth === 640")
+    image = page.locator('meta[property="og:image"]').get_attribute("content")
+    assert image.startswith(f"{PUBLIC_URL}/poster-"), image
+    while not scripts:
+        page.wait_for_timeout(10)
+    scripts[0].continue_()
+    visitor.wait_until(
+        "window.voxdagViewer?.renderer.hasDrawn && !document.getElementById('poster')"
+    )
+
+
 def check_missing_packs(visitor, url, folder, camera, reference):
     """Without its last packs, the package is drawn coarse, and the page reports it."""
     packs = sorted((folder / "packs").iterdir(), key=lambda path: int(path.name.split("-")[0]))
@@ -105,7 +122,9 @@ def check_missing_packs(visitor, url, folder, camera, reference):
 def check_packages(walk, city):
     """Checks a package of the city."""
     folder = walk.folder / "package"
-    walk.voxdag.run("publish", city.built, "-o", folder, "--pack-size", "512KiB")
+    walk.voxdag.run(
+        "publish", city.built, "-o", folder, "--pack-size", "512KiB", "--url", PUBLIC_URL
+    )
     camera, reference = city.cameras["street"], city.references["street"]
     for host in CHECKED_HOSTS:
         with serve(folder, host) as url:
@@ -114,6 +133,11 @@ def check_packages(walk, city):
                 check_host(visitor, url, host, camera, reference)
             visitor.leave()
         walk.say(f"a package from a server of kind {host}")
+    with serve(folder, "ranges") as url:
+        visitor = walk.visitor("package-poster")
+        check_poster(visitor, url)
+        visitor.leave()
+        walk.say("the poster of a package")
     with serve(folder, "ranges") as url:
         visitor = walk.visitor("package-missing")
         with visitor.expecting("404"):

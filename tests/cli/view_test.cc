@@ -62,21 +62,30 @@ TEST_F(View, RefusesWhatItCannotShow) {
 }
 
 TEST_F(View, IsPublished) {
-  const Json report = run_json({"publish", "m.vdag", "-o", "p", "--title", "A <sphere>"});
-  EXPECT_EQ(report["files"], 5);
+  const Json report = run_json(
+      {"publish", "m.vdag", "-o", "p", "--title", "A <sphere>", "--url", "https://example.org/p"});
+  EXPECT_EQ(report["files"], 6);
+  EXPECT_NE(contents("p/index.html").find("content=\"https://example.org/p/poster-"),
+            std::string::npos);
   const Json checked = run_json({"publish", "--check", "p"});
   for (const char* member : {"packs", "tiles", "color_pages"})
     EXPECT_EQ(checked[member], report[member]) << member;
   EXPECT_NE(run({"publish", "--check", "p/"}).out.find("intact"), std::string::npos);
-  run_json({"publish", "m.vdag", "-o", "p/", "--gray", "--pack-size", "1MiB"});
-  expect_error(2, "m.vdag is a file: expected a new folder", {"publish", "m.vdag", "-o", "m.vdag"});
+  run_json({"publish", "m.vdag", "-o", "p/", "--gray", "--pack-size", "1MiB", "--no-poster"});
+  EXPECT_EQ(contents("p/index.html").find("poster-"), std::string::npos);
+  expect_error(2, "m.vdag is a file: expected a new folder",
+               {"publish", "m.vdag", "-o", "m.vdag", "--no-poster"});
   expect_error(2, "--pack-size 1KiB: expected 256KiB to 1GiB",
                {"publish", "m.vdag", "-o", "q", "--pack-size", "1KiB"});
-  EXPECT_EQ(run_json({"publish", "m.vdag", "-o", "p.html", "--single-file"})["files"], 1);
+  expect_error(2, "--url ftp://a: expected an address that begins with https:// or http://",
+               {"publish", "m.vdag", "-o", "q", "--url", "ftp://a"});
+  const std::vector<std::string> single = {"publish", "m.vdag",        "-o",
+                                           "p.html",  "--single-file", "--no-poster"};
+  EXPECT_EQ(run_json(single)["files"], 1);
   EXPECT_NE(contents("p.html").find("data-file=\"package.json\">eyJ"), std::string::npos);
   EXPECT_FALSE(exists("p.html.partial") || exists("p.html.lock"));
-  expect_error(2, "--force", {"publish", "m.vdag", "-o", "p.html", "--single-file"});
-  run_json({"publish", "m.vdag", "-o", "p.html", "--single-file", "--force"});
+  expect_error(2, "--force", single);
+  run_json({"publish", "m.vdag", "-o", "p.html", "--single-file", "--force", "--no-poster"});
   expect_error(2, "--check DIR", {"publish", "m.vdag"});
   expect_error(3, "package.json", {"publish", "--check", "q"});
 }

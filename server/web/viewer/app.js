@@ -28,10 +28,10 @@ const kNoPicture = "There is no picture yet.";
 const kBookmarkDelayMs = 400;  // browsers refuse more than 100 changes of the address in 30 s
 
 export class Viewer {
-  // `renderer` may be started later. `places` has the elements {panel, tools, status}. If
-  // `bookmarks` is true, the viewer stores the camera in the fragment of the URL after it has
-  // moved. `isKeyed` is true if the user has opened the viewer with the keyboard. The viewer ends
-  // when `signal` aborts.
+  // `renderer` may be started later. `places` has the elements {panel, tools, status},
+  // and may have `poster`, a picture that is removed once the viewer has drawn. If `bookmarks` is
+  // true, the viewer stores the camera in the fragment of the URL after it has moved. `isKeyed` is
+  // true if the user has opened the viewer with the keyboard. The viewer ends when `signal` aborts.
   constructor(
       {canvas, renderer, manifest, places, fileName, signal, bookmarks = true, isKeyed = false}) {
     Object.assign(this, {canvas, renderer, manifest, places, fileName, signal, bookmarks});
@@ -197,6 +197,7 @@ export class Viewer {
     this.applyCamera();
     const drawn = this.renderer.frame();
     this.saveButton.disabled = !this.renderer.hasDrawn;
+    if (this.renderer.hasDrawn) this.places.poster?.remove();
     this.showMarkers();
     if (now - this.seen.time > kSeenIntervalMs) this.lookAhead(now);
     if (moving || drawn.moving || !drawn.complete) this.schedule();

@@ -1,7 +1,7 @@
 // Converts a camera to text and back: to the options of `voxdag render`, in scene units, and to the
 // members of a URL fragment.
 
-const kDigits = 4;  // decimal places of a voxel
+const kDigits = 3;  // decimal places of a voxel
 
 const numberText = (value) => String(Number(value.toPrecision(6)));
 
@@ -40,15 +40,28 @@ export function parseCameraText(space, text, defaultFov) {
   return parseCamera(space, option("camera"), option("target"), option("fov"), defaultFov);
 }
 
+// Returns the member of a URL fragment for a camera: "c", with the coordinates of the camera, the
+// coordinates of the target, and the field of view.
 export function cameraFragment(space, {eye, target, fovDegrees}) {
-  return {camera: space.text(eye), target: space.text(target), fov: numberText(fovDegrees)};
+  return {c: [space.text(eye), space.text(target), numberText(fovDegrees)].join(",")};
+}
+
+// Returns the texts {camera, target, fov} of the camera in the members of a URL fragment. They are
+// in one member, "c", or in the members "camera", "target" and "fov". Returns null if the members
+// contain no camera.
+export function cameraTexts(members) {
+  if (members.has("c")) {
+    const parts = members.get("c").split(","), text = (from, to) => parts.slice(from, to).join(",");
+    return {camera: text(0, 3), target: text(3, 6), fov: text(6)};
+  }
+  if (!members.has("camera")) return null;
+  return {camera: members.get("camera"), target: members.get("target"), fov: members.get("fov")};
 }
 
 // Parses a camera from the members of a URL fragment; null if the members contain no camera.
 export function parseCameraFragment(space, members, defaultFov) {
-  if (!members.has("camera")) return null;
-  return parseCamera(
-      space, members.get("camera"), members.get("target"), members.get("fov"), defaultFov);
+  const texts = cameraTexts(members);
+  return texts && parseCamera(space, texts.camera, texts.target, texts.fov, defaultFov);
 }
 
 function parseCamera(space, eye, target, fov, defaultFov) {

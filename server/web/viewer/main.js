@@ -10,6 +10,7 @@ import {countText, gridText, hasEnded, stateText, titleText} from "../lib/format
 import {problemBox} from "../views/parts.js";
 
 import {Viewer} from "./app.js";
+import {cameraTexts} from "./camera_text.js";
 import {takeBegun} from "./early.js";
 import {isPublished, sourceOfPage} from "./page_source.js";
 import {Renderer, WebGLUnavailable} from "./render/renderer.js";
@@ -41,6 +42,7 @@ function budgetBytes() {
 // Shows a message instead of the picture, until the next message or a picture replaces it.
 function showMessage(...content) {
   place("scene").hidden = place("panel").hidden = place("tools").hidden = true;
+  place("poster")?.remove();
   place("message").hidden = false;
   clear(place("message"), h("div", {class: "card stack narrow"}, ...content));
 }
@@ -153,10 +155,10 @@ class WaitingMessage {
 // Returns the camera in the page's address. The address is untrusted and the result is copied to a
 // shell, so only numbers are used.
 function cameraOfAddress() {
-  const members = new URLSearchParams(location.hash.slice(1));
+  const camera = cameraTexts(new URLSearchParams(location.hash.slice(1))) ?? {};
   return ["camera", "target", "fov"]
-      .filter((name) => /^[-+0-9.eE,]+$/.test(members.get(name) ?? ""))
-      .map((name) => ` --${name} ${members.get(name)}`)
+      .filter((name) => /^[-+0-9.eE,]+$/.test(camera[name] ?? ""))
+      .map((name) => ` --${name} ${camera[name]}`)
       .join("");
 }
 
@@ -167,6 +169,9 @@ async function showWithoutWebgl(reason, job) {
     h("h1", {}, "This browser cannot draw the scene."),
     h("p", {}, `The viewer needs WebGL2: ${reason}`)
   ];
+  const poster = place("poster");
+  if (poster)
+    content.push(h("img", {class: "still", src: poster.src, alt: "Rendering of the voxels"}));
   if (job?.preview) {
     const response = await fetch(job.links.preview, {headers: authorization()});
     const url = URL.createObjectURL(await response.blob());
@@ -213,7 +218,12 @@ async function start() {
       signal: ended.signal,
       fileName:
           (job ? titleText(job) : manifest.name ?? "voxdag").replace(/[^A-Za-z0-9._-]+/g, "-"),
-      places: {panel: place("panel"), tools: place("tools"), status: place("status")}
+      places: {
+        panel: place("panel"),
+        tools: place("tools"),
+        status: place("status"),
+        poster: place("poster")
+      }
     });
     await started;
   } catch (error) {

@@ -1,5 +1,6 @@
 // Makes the page show a package. Only pages that `voxdag publish` has written load this module.
 
+import {cameraTexts} from "../camera_text.js";
 import {setPublished} from "../page_source.js";
 
 import {EmbeddedFiles} from "./embedded_files.js";
@@ -9,6 +10,10 @@ import {PackageSource} from "./package_source.js";
 // The URL of the folder of the package, relative to the page. The folder may be on another server.
 // If the page itself contains the package, the URL is "".
 const kUrl = document.querySelector("meta[name=voxdag-package]").content;
+
+// The poster shows the first camera of the file. If the address has another camera, it is removed.
+if (cameraTexts(new URLSearchParams(location.hash.slice(1))))
+  document.getElementById("poster")?.remove();
 
 setPublished(
     () => new PackageSource(

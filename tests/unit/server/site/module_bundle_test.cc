@@ -38,7 +38,7 @@ TEST(ModuleBundle, RefusesOtherForms) {
 }
 
 TEST(ViewerSite, RefersToNoOtherFile) {
-  const std::vector<query::ViewerFile> site = viewer_site("a <b> & \"c\"");
+  const std::vector<query::ViewerFile> site = viewer_site({"a <b> & \"c\"", "", ""});
   ASSERT_EQ(site.size(), 2u);
   EXPECT_EQ(site[0].name, query::hashed_name("viewer", site[0].contents, ".js"));
   EXPECT_EQ(site[1].name, "index.html");
@@ -46,10 +46,26 @@ TEST(ViewerSite, RefersToNoOtherFile) {
   EXPECT_NE(page.find("<title>a &lt;b&gt; &amp; &quot;c&quot;</title>"), page.npos);
   EXPECT_NE(page.find("src=\"" + site[0].name + "\""), page.npos);
   EXPECT_EQ(page.find("=\"/"), page.npos);
-  const std::string single = page_with_module("a");
+  const std::string single = page_with_module({"a", "", ""});
   EXPECT_EQ(single.find("=\"/"), single.npos);
   EXPECT_NE(single.find(site[0].contents), single.npos);
   EXPECT_EQ(site[0].contents.find("</script"), std::string::npos);
+}
+
+TEST(ViewerSite, HasAPoster) {
+  const std::vector<query::ViewerFile> site =
+      viewer_site({"a", "picture", "https://example.org/a&b/"});
+  ASSERT_EQ(site.size(), 3u);
+  EXPECT_EQ(site[1].name, query::hashed_name("poster", "picture", ".png"));
+  EXPECT_EQ(site[1].contents, "picture");
+  const std::string& page = site[2].contents;
+  EXPECT_NE(page.find("src=\"" + site[1].name + "\""), page.npos);
+  EXPECT_NE(page.find("<meta property=\"og:image\" content=\"https://example.org/a&amp;b/" +
+                      site[1].name + "\">"),
+            page.npos);
+  const std::string single = page_with_module({"a", "picture", ""});
+  EXPECT_NE(single.find("src=\"data:image/png;base64,cGljdHVyZQ==\""), single.npos);
+  EXPECT_EQ(single.find("og:image"), single.npos);
 }
 
 }  // namespace

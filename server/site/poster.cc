@@ -1,0 +1,41 @@
+#include "server/site/poster.h"
+
+#include <nlohmann/json.hpp>
+
+#include "query/dag/dag_view.h"
+#include "query/render/renderer.h"
+
+namespace voxdag::server {
+namespace {
+
+// Returns the manifest's camera in voxels.
+query::Placement placement_of(const nlohmann::json& camera, const voxdag_reader::File& file) {
+  const auto voxels = [&](const nlohmann::json& point) {
+    query::Vec position;
+    for (int axis = 0; axis < 3; ++axis)
+      position[axis] = (point.at(static_cast<size_t>(axis)).get<double>() - file.origin()[axis]) *
+                       static_cast<double>(file.resolution()) / file.edge();
+    return position;
+  };
+  return {voxels(camera.at("position")), voxels(camera.at("target")),
+          camera.at("fov_degrees").get<double>()};
+}
+
+}  // namespace
+
+std::string render_poster(const voxdag_reader::File& file, const query::PackageSpec& spec,
+                          Progress& progress, const CancelToken& cancel) {
+  const query::DagView dag(file);
+  if (dag.empty()) return "";
+  const auto manifest = nlohmann::json::parse(spec.manifest);
+  query::RenderOptions options;
+  options.width = kPosterWidth;
+  options.height = kPosterHeight;
+  options.threads = spec.threads;
+  options.colors = spec.colors ? &file : nullptr;
+  const query::Picture picture = query::render_picture(
+      dag, placement_of(manifest.at("camera"), file), options, progress, cancel);
+  return query::encode_png(picture);
+}
+
+}  // namespace voxdag::server
