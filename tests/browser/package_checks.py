@@ -91,7 +91,7 @@ def check_host(visitor, url, host, camera, reference):
 def check_poster(visitor, url):
     """The page shows the poster until the viewer has drawn."""
     page, scripts = visitor.page, []
-    page.route("**/viewer-*.js", scripts.append)
+    page.route("**/viewer-*.js", lambda route: scripts.append(route))
     page.goto(f"{url}/", wait_until="commit")
     visitor.wait_until("document.getElementById('poster')?.naturalWidth === 640")
     image = page.locator('meta[property="og:image"]').get_attribute("content")
