@@ -54,8 +54,8 @@ void run(const JobsCommand& command, ServiceClient& service, CommandContext&) {
     print(answer);
 }
 
-// Returns "" if `states` has only characters that are allowed in a URL without an escape, otherwise
-// an error message. The server checks whether the states exist.
+// Returns "" if `states` has only lowercase letters and commas, which need no escape in a URL.
+// Otherwise returns an error message. The server checks whether the states exist.
 std::string check_states(const std::string& states) {
   const bool fine = states.find_first_not_of("abcdefghijklmnopqrstuvwxyz,") == std::string::npos;
   return fine ? "" : "'" + states + "': expected states such as running,queued";

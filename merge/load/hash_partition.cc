@@ -21,7 +21,7 @@ unsigned choose_bucket_bits(const HashInterval& interval, uint64_t rows, uint64_
 }  // namespace
 
 uint64_t HashPartition::bytes_for(const RowCount& count, uint32_t position_words) {
-  // Memory per row: hash, mask, bucket begins (at most 4 bytes; see choose_bucket_bits()) and
+  // Memory per row: hash, mask, bucket_begins_ (at most 4 bytes; see choose_bucket_bits()) and
   // position. Memory per word: the word itself, and one bit while children are replaced.
   return count.rows * (8 + 1 + 4 + 4 * position_words) + count.words * 4 + count.words / 8;
 }

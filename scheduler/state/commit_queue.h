@@ -46,10 +46,10 @@ class CommitQueue {
   // Makes all built artifacts durable. Throws each error once; the next call retries the remaining
   // artifacts.
   void commit();
-  // Called when the worker has no more subvolumes. Makes the last group durable if it has bins to
-  // release. Otherwise only makes the job store return the group as built; the group becomes
-  // durable by a later commit(). Completes the segment. The triangle store is not used after this
-  // call.
+  // Called when the worker has no more subvolumes. Completes the segment. If the last group has
+  // bins of triangles to release, commits it now, because the triangle store is not used after this
+  // call. Otherwise the group becomes durable only with a later commit(). Until then,
+  // JobStore::leaves() in this process returns its subvolumes as built.
   void finish();
 
  private:

@@ -24,9 +24,10 @@ TEST_F(Exhaustive, EveryVoxelOfABrick) {
   }
 }
 
-// For many masks of octants, builds a subvolume with the same voxels in each octant of the mask.
-// The root, a node of the top tree, then has this mask, and all its children are the same node. If
-// the merge ignored the mask, voxels would move to other octants.
+// For many masks, builds a scene in which each octant of the mask is one subvolume. All subvolumes
+// have the same voxels, relative to their own corners. So the root, which is a node of the top
+// tree, has this mask, and all its children are the same node. If the merge ignored the mask,
+// voxels would move to other octants.
 TEST_F(Exhaustive, EveryMaskOfTheTopTree) {
   for (int mask = 1; mask < 256; mask += mask < 32 ? 1 : 7) {
     SCOPED_TRACE(mask);

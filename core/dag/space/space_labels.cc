@@ -258,9 +258,10 @@ class SpaceLabeler {
   SpaceLabels& out_;
   FaceRelations relations_;
   uint64_t touch_used_ = 0, maps_used_ = 0;
-  // Numbers of components of the node's octants. The first elements stand for these components
-  // themselves. Further elements stand for components of the smaller cubes that are being joined,
-  // and have the number of the octant's component that contains the smaller cube's component.
+  // A number for each component: an index in parents_, or kNone. The components of the node's
+  // octants are first and have the numbers 0, 1, .... While join() descends, the components of
+  // smaller cubes follow. Each has the number of the octant's component that contains it, or kNone
+  // if it is closed (space_labels.h) in its octant or in a smaller cube around it.
   std::vector<uint32_t> elements_;
   std::vector<uint32_t> parents_;  // union-find over the components of the octants
   std::vector<uint8_t> touch_;

@@ -310,8 +310,8 @@ void Verifier::check_level(uint32_t level) {
   hashes_ = std::move(hashes);
 }
 
-// Adds the number of occurrences of each node in a span (`times`) to the numbers of its children
-// (`child_times`).
+// Counts how often the children of a span's nodes occur in the octree. For each child of each node,
+// adds the node's number of occurrences (in `times`) to the child's (in `child_times`).
 void Verifier::count_children(uint32_t level, uint64_t span, const PageBuffer<uint64_t>& times,
                               PageBuffer<uint64_t>& child_times) const {
   visit_span_with_children(

@@ -60,12 +60,13 @@ class HexSweep {
   void for_each_cell(const Visit& visit) const;
 
  private:
-  // A brick with its mask of cells. `place` is its position in the slab: place_of(y, z), counted in
-  // bricks. PointBrick is the same for points.
+  // The selected cells of a brick. `place` is place_of(y, z), where y and z are the position of the
+  // brick in its slab, in bricks.
   struct HexBrick {
     uint64_t place = 0;
     uint64_t mask = 0;
   };
+  // The points at the low corners of a brick's cells. `place` as in HexBrick.
   struct PointBrick {
     uint64_t place = 0;
     uint64_t mask = 0;

@@ -16,8 +16,8 @@
 
 namespace voxdag::gltf {
 
-// A violation of the rules of glTF 2.0 at a position in the JSON. The message does not name the
-// scene file.
+// A violation of the rules of glTF 2.0 at a position in the JSON. The message begins with this
+// position, for example "nodes[3].children[0]", and does not name the scene file.
 struct Violation {
   std::string message;
 };

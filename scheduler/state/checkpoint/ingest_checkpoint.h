@@ -1,7 +1,7 @@
-// Checkpoints of scan, ingest and partition of a large scene. About every two seconds the progress
-// becomes durable: the triangles in the file of a DurableStore, and the state in a row of the job
-// store, which refers to that file. The next run resumes at this progress. The checkpoint also
-// chooses the build's triangle store.
+// Checkpoints of the stages before the build of subvolumes (scan, ingest and partition) of a large
+// scene. About every two seconds the progress becomes durable: the triangles in the file of a
+// DurableStore, and the state in a row of the job store, which refers to that file. The next run
+// resumes at this progress. The checkpoint also chooses the build's triangle store.
 //
 // Invariants:
 //   1. The row refers only to bytes of the file that were synced before the row was written.

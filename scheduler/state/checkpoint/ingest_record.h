@@ -1,5 +1,6 @@
-// The record of a checkpoint of scan, ingest and partition: the scene and the progress. It is one
-// row of the job store; the triangles are in the durable store.
+// A checkpoint of the stages before the build of subvolumes (IngestStage): the scene, and the
+// progress of the stages. The record is one row of the job store (job_store.h). The triangles
+// themselves are in a file (durable_store.h).
 #pragma once
 
 #include <cstddef>

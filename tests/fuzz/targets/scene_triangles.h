@@ -1,4 +1,4 @@
-// The checks of a file that all fuzz targets for scene formats share.
+// check_scene(): the checks that the fuzz targets of all scene formats run on their input.
 #pragma once
 
 #include <string>

@@ -120,7 +120,8 @@ TEST(GltfGeometry, UnusualStrides) {
   }
 }
 
-// The indices and values of sparse accessors may also have a byteStride that glTF does not allow.
+// For the indices and values of sparse accessors, glTF allows no byteStride. If the file has one,
+// it is used, with a warning.
 TEST(GltfGeometry, SparseStrides) {
   SceneBuilder scene = one_triangle();
   scene.root["accessors"][0]["sparse"] = {

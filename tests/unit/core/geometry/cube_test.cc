@@ -43,7 +43,8 @@ TEST(Cube, ChildOrderIsMortonOrder) {
     EXPECT_EQ(code(cube.child(c)), 8 * code(cube) + static_cast<uint64_t>(c));
 }
 
-// Edges halve from R down to one voxel.
+// The edge of a cube halves with each level, from the grid's edge at level 0 to one voxel at the
+// last level.
 TEST(Cube, EdgesHalve) {
   EXPECT_EQ(Cube{}.edge_voxels(20), 1048576);
   EXPECT_EQ((Cube{18, {}}).edge_voxels(20), 4);

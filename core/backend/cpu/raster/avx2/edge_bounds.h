@@ -67,12 +67,17 @@ struct EdgeLanes {
   }
 };
 
-// lane[set] is a permutation of the lanes of three edges; bit i of `set` means that edge i has up <
-// 0. The permutation moves edges that bound x from below to the first two 64-bit lanes, and edges
-// that bound x from above to the other two. Each lane is given as two 32-bit lanes. A bound without
-// an edge gets lane 3, which excludes nothing. The values of `up` of the three edges sum to 0. So
-// one or two edges have up < 0, unless up = 0 for all three. An edge with up = 0 may be a bound on
-// either side.
+// The order in which EdgeBounds stores the bounds of three edges: first two that bound x from
+// below, then two that bound x from above. lane[set] is this order if bit i of `set` is 1 for each
+// edge i that has up < 0 and so bounds x from above. (`up` is the factor of x, see the top of this
+// file.)
+//
+// The order lists lanes of EdgeLanes. Each is a pair of 32-bit lanes, as the permute instruction
+// needs them. Lanes 0 to 2 are the edges. A bound without an edge uses lane 3, which excludes
+// nothing.
+//
+// Two bounds per side are enough: the three values of `up` sum to 0, so one or two are negative, or
+// all are 0. An edge with up = 0 may be on either side.
 struct BoundOrder {
   alignas(32) int32_t lane[8][8] = {};
   constexpr BoundOrder() {
@@ -130,8 +135,8 @@ class EdgeBounds {
     return out;
   }
 
-  // Bounds of x in four rows: each lane of `k` is the number of a row. y is the y of the file's
-  // comment, before rounding. An edge with up = 0 counts in one of the two functions.
+  // Return the bounds of x in four rows. Each lane of `k` is the number of a row. y is defined at
+  // the top of this file. An edge with up = 0 counts in one of the two functions.
   //   below()  returns below_more + the largest y of the edges with up > 0. So a voxel inside has
   //            x > floor(below() - below_more).
   //   over()   returns over_more + the largest y of the edges with up < 0, which bound -x. So a
