@@ -31,7 +31,7 @@ uint32_t grid_levels(const SelectionOptions& options, const voxdag_reader::File&
 
 [[noreturn]] void refuse_order(const std::string& text) {
   throw Error(ErrorCode::kInvalidInput,
-              "--region '" + text + "': expected the low corner before the high one");
+              "--region '" + text + "': expected X0 < X1, Y0 < Y1 and Z0 < Z1");
 }
 
 query::Region world_region(const std::string& text, const voxdag_reader::File& file,

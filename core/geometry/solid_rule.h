@@ -40,7 +40,8 @@ VOXDAG_HD constexpr int sample_pitch_log2(uint32_t grid_levels) {
   return kUnitBits + solid_block_log2(grid_levels);
 }
 
-// Returns the view along one axis from a corner. `left` and `total` are the sums defined above.
+// Returns the view along one axis from a corner. The comment at the top of this file defines the
+// view, which is a number, and the sums `left` and `total`.
 VOXDAG_HD constexpr int32_t view_of(SolidRule rule, int32_t left, int32_t total) {
   if (rule == SolidRule::kWinding) return 2 * left - total;
   return (left & 1) + ((total - left) & 1);

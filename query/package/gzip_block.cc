@@ -25,7 +25,10 @@ std::string gzip_block(std::string_view plain) {
   z_stream stream{};
   if (deflateInit2(&stream, kBlockLevel, Z_DEFLATED, kGzipWindowBits, kMemoryLevel,
                    Z_DEFAULT_STRATEGY) != Z_OK)
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: zlib cannot compress a block");
+    throw Error(
+        ErrorCode::kOutOfMemory,
+        "out of memory: zlib cannot compress a block of the package: expected more free memory "
+        "on this machine");
   std::string out(deflateBound(&stream, plain.size()), '\0');
   set_input(stream, plain);
   stream.next_out = reinterpret_cast<Bytef*>(out.data());
@@ -41,7 +44,9 @@ std::string gzip_block(std::string_view plain) {
 std::string gunzip_block(std::string_view bytes, size_t max_bytes) {
   z_stream stream{};
   if (inflateInit2(&stream, kGzipWindowBits) != Z_OK)
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: zlib cannot decompress a block");
+    throw Error(ErrorCode::kOutOfMemory,
+                "out of memory: zlib cannot decompress a block of the package: expected more free "
+                "memory on this machine");
   set_input(stream, bytes);
   std::string out(std::min(max_bytes, kFirstBytes), '\0');
   int status = Z_OK;
@@ -58,7 +63,10 @@ std::string gunzip_block(std::string_view bytes, size_t max_bytes) {
   const bool is_complete = status == Z_STREAM_END && stream.avail_in == 0;
   inflateEnd(&stream);
   if (!is_complete)
-    throw Error(ErrorCode::kCorrupt, "a block is damaged: expected its gzip checksum to match");
+    throw Error(ErrorCode::kCorrupt,
+                "the gzip data are damaged: expected one complete gzip stream with a matching "
+                "checksum, of at most " +
+                    std::to_string(max_bytes) + " bytes when decompressed");
   return out;
 }
 

@@ -51,7 +51,8 @@ class Parser {
            std::string("'") + kFormat + "'");
     if (json.value("version", Json()) != kVersion)
       throw Error(ErrorCode::kUnsupportedVersion,
-                  path_ + ": expected version " + std::to_string(kVersion) + " of the package");
+                  path_ + ": it has version " + json.value("version", Json()).dump() +
+                      " of the format, expected version " + std::to_string(kVersion));
     PackageIndex index;
     const Json& manifest = member(json, "manifest");
     expect(manifest.is_object(), "'manifest'", "an object");

@@ -203,8 +203,10 @@ uint64_t PackageReader::check_tiles(const PlacedBand& band, Progress& progress,
       const TileBlock tiles =
           decode_tile_block(bytes, grid_levels_, band.band.level, static_cast<uint32_t>(count));
       if (tiles.first != next)
-        throw Error(ErrorCode::kCorrupt, "its first new number is " + std::to_string(tiles.first) +
-                                             ": expected " + std::to_string(next));
+        throw Error(ErrorCode::kCorrupt, "its first new tile has the number " +
+                                             std::to_string(tiles.first) + ", expected " +
+                                             std::to_string(next) +
+                                             ", which follows the tiles of the blocks before it");
       next = tiles.next;
     });
     progress.advance(1);
@@ -220,11 +222,16 @@ void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
     const std::string bytes = block(at);
     naming_file(name_of(at), [&] {
       const std::vector<CodedPage> pages = decode_color_block(bytes);
-      if (pages[0].code != places_[at].code || (count > 0 && pages[0].code <= last))
-        throw Error(ErrorCode::kCorrupt, "its first page has the code " +
-                                             std::to_string(pages[0].code) + ", expected " +
-                                             std::to_string(places_[at].code) +
-                                             " as in the directory, and increasing codes");
+      const uint64_t code = pages[0].code;
+      if (code != places_[at].code)
+        throw Error(ErrorCode::kCorrupt,
+                    "its first color page has the Morton code " + std::to_string(code) +
+                        ", expected " + std::to_string(places_[at].code) + " as in the directory");
+      if (count > 0 && code <= last)
+        throw Error(ErrorCode::kCorrupt, "its first color page has the Morton code " +
+                                             std::to_string(code) + ", expected more than " +
+                                             std::to_string(last) +
+                                             ", the last code of the block before it");
       last = pages.back().code;
       count += pages.size();
     });

@@ -140,8 +140,8 @@ TEST_F(Extract, RefusalsOfExports) {
   refused("s.vdag is an input and would be overwritten", {"-o", "s.vdag", "--force"});
   refused("expected the name of a file", {"-o", ""});
   refused("64MiB", {"-o", "x.ply", "--memory", "1"});
-  refused("low corner before", {"-o", "x.ply", "--region", "nan,0,0,1,1,1", "--world"});
-  refused("low corner before", {"-o", "x.ply", "--region", "3,0,0,1,1,1"});
+  refused("expected X0 < X1", {"-o", "x.ply", "--region", "nan,0,0,1,1,1", "--world"});
+  refused("expected X0 < X1", {"-o", "x.ply", "--region", "3,0,0,1,1,1"});
   refused("outside the grid", {"-o", "x.ply", "--region", "300,0,0,400,1,1"});
   put("x.ply", "mine");
   refused("x.ply exists", {"-o", "x.ply"});

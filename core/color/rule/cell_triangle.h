@@ -91,10 +91,11 @@ struct CellTriangle {
   double slope[2];  // rise along axis 2 per unit of axes 0 and 1; only for estimates
   bool degenerate;
   double area;  // twice the area in square lattice units: the length of the normal
-  // The plane's value at a point x is n.x - n.v, where v is a vertex. plane_floor and plane_ceil
-  // are the value at the grid's origin, divided by E and rounded down and up. column_floor and
-  // column_ceil are the value at column (0, 0) and height 0, divided by E/4 and rounded down and
-  // up.
+  // The function of the triangle's plane is normal.x - normal.v, for a point x and any vertex v. It
+  // is 0 on the plane. plane_floor and plane_ceil are its value at the grid's origin, divided by
+  // the cell's edge E = 2^cell_bits and rounded down and up. column_floor and column_ceil are its
+  // value where column (0, 0) of the comment at the top of this file has the coordinate 0 along
+  // axis 2, divided by E/4 and rounded down and up.
   Int plane_floor, plane_ceil, column_floor, column_ceil;
   // edges[d][i] is the edge from vertex i to i + 1 in the projection along axis d. In its function,
   // x and y are along the axes d + 1 and d + 2. (All sums are modulo 3.)

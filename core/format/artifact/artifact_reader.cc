@@ -20,9 +20,11 @@ std::vector<std::byte> read_index(const ReadableFile& file, const ArtifactRef& r
                       ref.index_offset - ref.offset <= ref.bytes;
   if (!inside)
     throw Error(ErrorCode::kCorrupt,
-                where + ": " + std::to_string(ref.bytes) + " bytes, with the index at byte " +
-                    std::to_string(ref.index_offset) + ": expected a part of the file, which has " +
-                    std::to_string(size) + " bytes");
+                where + ": it has " + std::to_string(ref.bytes) +
+                    " bytes, and its index begins at byte " + std::to_string(ref.index_offset) +
+                    ": expected an artifact between byte " + std::to_string(kSegmentHeaderBytes) +
+                    " and the end of the file (byte " + std::to_string(size) +
+                    "), and an index inside the artifact");
   check_index_bytes(ref, where);
   std::vector<std::byte> bytes(ref.offset + ref.bytes - ref.index_offset);
   file.read_at(ref.index_offset, bytes);

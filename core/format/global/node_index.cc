@@ -76,8 +76,8 @@ uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
   }
   if (at != level_.word_count)
     throw Error(ErrorCode::kCorrupt, where + ": its last node ends at word " + std::to_string(at) +
-                                         ", the level at word " +
-                                         std::to_string(level_.word_count));
+                                         ", expected word " + std::to_string(level_.word_count) +
+                                         ", where the level ends");
   return nodes;
 }
 

@@ -124,7 +124,9 @@ class Bytes {
       read = std::fread(copy_.data(), 1, static_cast<size_t>(size_), file) == size_;
     }
     std::fclose(file);
-    if (!read) fail(Problem::kIo, "read " + path + " failed");
+    if (!read)
+      fail(Problem::kIo,
+           "cannot read " + path + " completely: expected a file that no program changes");
   }
 #else
   // Opens the file. Without O_NONBLOCK, opening a pipe would wait for its writer. The flag has no

@@ -52,9 +52,10 @@ void SpaceReserve::use(const std::string& path, uint64_t bytes) {
   // removed.
   const uint64_t free_bytes = free_space(parent_directory(path));
   if (free_bytes < bytes)
-    throw Error(ErrorCode::kNoSpace, "write " + path + ": the disk has " + size_text(free_bytes) +
-                                         " free besides the " + size_text(reserve_bytes_) +
-                                         " that stay reserved");
+    throw Error(ErrorCode::kNoSpace,
+                "cannot write " + path + ": the disk has " + size_text(free_bytes) +
+                    " free in addition to the " + size_text(reserve_bytes_) +
+                    " that must stay free, expected at least " + size_text(bytes));
   // If little more than the reserve is free, every write reads the free space again.
   unchecked_bytes_ = free_bytes < 2 * kCheckBytes ? kCheckBytes : 0;
 }

@@ -38,7 +38,8 @@ struct OtNode {
   uint8_t children = 0;
 };
 
-// Combines the children of an inner node.
+// Computes an inner node's values from its children: the largest log-odds, and the mean color of
+// the children that have a color.
 class OtChildren {
  public:
   void add(int child, const OtNode& node) {

@@ -46,7 +46,7 @@ void check_layout(const MeshoptView& view, const std::string& path) {
   };
   const bool is_vertices = view.mode == MeshoptView::Mode::kAttributes;
   if (is_vertices && (view.stride == 0 || view.stride > 256 || view.stride % 4 != 0))
-    violate("byteStride", view.stride, "a multiple of 4 up to 256");
+    violate("byteStride", view.stride, "a multiple of 4 from 4 to 256");
   if (!is_vertices && view.stride != 2 && view.stride != 4)
     violate("byteStride", view.stride, "2 or 4, the sizes of indices");
   if (view.mode == MeshoptView::Mode::kTriangles && view.count % 3 != 0)

@@ -56,7 +56,7 @@ int JsonElement::as_index() const {
 
 uint64_t JsonElement::as_size() const {
   const auto number = whole_number();
-  if (!number || *number > INT64_MAX) violate("a whole number that is not negative");
+  if (!number || *number > INT64_MAX) violate("a whole number from 0 to 9223372036854775807");
   return *number;
 }
 

@@ -166,7 +166,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
     }
     charge(kBytesPerObjectMember + key_.size());
     if (parent.contains(key_))
-      violate(element().path() + "." + printable(key_) + " is given twice, expected it once");
+      violate(element().path() + ": the member " + printable(key_) +
+              " is given twice in an object, expected it once");
     Json& member = parent[key_];
     member = std::move(value);
     return &member;

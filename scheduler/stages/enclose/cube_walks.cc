@@ -113,8 +113,9 @@ class WalkPass {
     for (int octant = 0; octant < 8; ++octant) find_cubes(cube.child(octant));
   }
 
-  // Computes the result of a cube, or of its octants if the cube does not fit in the worker's
-  // memory.
+  // Computes the blocked positions or the enclosed voxels of a cube (see kind_), unless result_ has
+  // them from an earlier run. If the cube does not fit in the worker's memory, its octants are
+  // computed one after the other.
   void filter(EncloseWorker& worker, const Cube& cube) {
     job_.context.cancel.check();
     const Cube out = kind_ == Kind::kBlocked ? cube : *voxel_cube(cube);

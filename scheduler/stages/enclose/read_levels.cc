@@ -56,7 +56,10 @@ class LevelsReader {
     const auto roots = artifact_.roots();
     const auto root =
         std::ranges::find_if(roots, [&](const ArtifactRoot& r) { return contains(r.cube, cube); });
-    if (root == roots.end()) refuse("no root is in the cube of the artifact's subvolume");
+    if (root == roots.end())
+      refuse("none of its roots contains the cube of level " + std::to_string(cube.level) + " at " +
+             std::to_string(cube.position[0]) + " " + std::to_string(cube.position[1]) + " " +
+             std::to_string(cube.position[2]));
     uint32_t row = root->index;
     for (uint32_t level = root->cube.level; level < cube.level; ++level) {
       const auto child = child_row(level, row, ancestor(cube, level + 1).child_index());

@@ -23,9 +23,10 @@ namespace {
 // Maximum expected bricks per subvolume. Building that many takes a fraction of a second, and their
 // tables fit in the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
-// Maximum expected bricks per flat subvolume (SubvolumeLimits). A flat subvolume takes only 3 to 16
-// ns per expected brick, so it may be larger. If subvolumes are larger, fewer nodes are stored in
-// several of them, so the merge reads fewer rows.
+// Maximum expected bricks per flat subvolume, which has large triangles (SubvolumeLimits). Building
+// it takes only 3 to 16 ns per expected brick, so it may be larger than other subvolumes. With
+// larger subvolumes, fewer equal nodes occur in more than one subvolume, so the merge reads fewer
+// rows.
 constexpr double kMaxBricksPerFlatSubvolume = 128e6;
 // Bytes of memory per expected brick, enough for most flat subvolumes. The others may need more
 // memory than a worker has; they are then split.

@@ -47,10 +47,12 @@ Tokens Tokens::read(FileSystem& files, const std::string& path) {
     const auto parsed = parse_role(role);
     if (!parsed || !is_name(name) || hash.size() != kHashDigits || !more.empty() ||
         hash.find_first_not_of("0123456789abcdef") != std::string::npos)
-      throw Error(ErrorCode::kInvalidInput,
-                  path + ":" + std::to_string(number) +
-                      ": invalid token: expected ROLE NAME SHA256. ROLE is one of read, submit and "
-                      "admin; SHA256 has 64 lowercase hexadecimal digits");
+      throw Error(
+          ErrorCode::kInvalidInput,
+          path + ":" + std::to_string(number) +
+              ": invalid token: expected ROLE NAME SHA256. ROLE is one of read, submit and "
+              "admin; NAME has 1 to 64 of the characters A-Z, a-z, 0-9 and ._@-; SHA256 has 64 "
+              "lowercase hexadecimal digits");
     tokens.entries_.push_back({{*parsed, name, ""}, hash});
   }
   if (tokens.entries_.empty())

@@ -256,13 +256,15 @@ TEST(GltfRefusals, NoAsset) {
 // A member that is given twice is ambiguous, so it is refused.
 TEST(GltfRefusals, DuplicateMembers) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":1}]})";
-  EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
+  EXPECT_NE(error_of_file(json).message().find("nodes[0]: the member mesh is given twice"),
+            std::string::npos);
 }
 
 // A repeated member is also refused if its first value is a number and its second an object.
 TEST(GltfMessages, MemberThatIsANumberAndThenAnObjectIsRefused) {
   const std::string json = R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"mesh":{"a":1}}]})";
-  EXPECT_NE(error_of_file(json).message().find("nodes[0].mesh is given twice"), std::string::npos);
+  EXPECT_NE(error_of_file(json).message().find("nodes[0]: the member mesh is given twice"),
+            std::string::npos);
 }
 
 // JSON that is nested deeper than any stack is skipped in members that are not read, and otherwise

@@ -233,7 +233,7 @@ TEST(GltfMeshopt, WhatDoesNotFitIsRefusedByName) {
   EXPECT_THAT(with({{"filter", "OCTAHEDRAL"}}, same), HasSubstr("expected 4 or 8, as OCTAHEDRAL"));
   EXPECT_THAT(with({{"filter", "COLOR"}}, same), HasSubstr("expected 4 or 8, as COLOR"));
   EXPECT_THAT(with({{"byteStride", 10}}, same),
-              HasSubstr("is 10, expected a multiple of 4 up to 256"));
+              HasSubstr("is 10, expected a multiple of 4 from 4 to 256"));
   EXPECT_THAT(with({{"byteStride", 16}}, same), HasSubstr("has byteStride 12: expected 16, the"));
   EXPECT_THAT(with({{"count", 3599}}, same),
               HasSubstr("has byteLength 43200: expected at most 43188"));
