@@ -280,7 +280,10 @@ void write_levels(BuildJob& job, GlobalFileWriter& out) {
 // subvolumes and call this function again.
 bool merge_and_publish(BuildJob& job, bool& has_restarted) {
   AttributeSections attributes(job);
-  if (is_published(job, attributes)) return true;
+  if (is_published(job, attributes)) {
+    job.work.remove_merged();
+    return true;
+  }
   bool reads_scene = false;  // if true, an error may come from the scene's files
   try {
     enclose(job);

@@ -35,7 +35,7 @@ class DagExport {
   const DagView dag_;
   // Sets filled_ to the filled DAG of the grid with 2^grid_levels cells per edge, unless the last
   // call was for the same grid.
-  void fill(const DagView& dag, uint32_t grid_levels);
+  void fill(const DagView& dag, uint32_t grid_levels, const CancelToken& cancel);
 
   std::optional<TurnedDag> turned_;  // made by the first write() if turn_ changes the axes
   std::optional<FilledDag> filled_;  // filled DAG of the last written grid, for --outside

@@ -108,10 +108,10 @@ bool DagExport::has_voxels(const Selection& selection) const {
   return found;
 }
 
-void DagExport::fill(const DagView& dag, uint32_t grid_levels) {
+void DagExport::fill(const DagView& dag, uint32_t grid_levels, const CancelToken& cancel) {
   if (filled_ && filled_->view().grid_levels() == grid_levels) return;
   filled_.reset();
-  filled_.emplace(dag, grid_levels, file_.path(), budget_);
+  filled_.emplace(dag, grid_levels, file_.path(), budget_, cancel);
 }
 
 ExportReport DagExport::write(FileSystem& files, const Selection& selection,
@@ -127,7 +127,7 @@ ExportReport DagExport::write(FileSystem& files, const Selection& selection,
     if (!turn_.is_none() && !turned_ && !dag_.empty())
       turned_.emplace(dag_, turn_, file_.path(), budget_, cancel);
     const DagView& dag = turned_ ? turned_->view() : dag_;
-    if (request_.options.outside && !dag.empty()) fill(dag, selection.grid_levels);
+    if (request_.options.outside && !dag.empty()) fill(dag, selection.grid_levels, cancel);
     const ExportJob job{outputs.files(),
                         file_,
                         dag,

@@ -58,8 +58,10 @@ class FilledNodes {
 class Filler {
  public:
   // If `keeps_closed` is true, closed components (space_labels.h) remain empty.
-  Filler(PooledMemory& memory, const SpaceLabels& labels, bool keeps_closed, SubDagTables& tables)
-      : memory_(memory),
+  Filler(PooledMemory& memory, const SpaceLabels& labels, bool keeps_closed, SubDagTables& tables,
+         const CancelToken* cancel = nullptr)
+      : cancel_(cancel),
+        memory_(memory),
         labels_(labels),
         keeps_closed_(keeps_closed),
         tables_(tables),
@@ -145,6 +147,7 @@ class Filler {
   }
 
   NodeRef fill_octants(int depth, const LabeledCube& cube) {
+    if (cancel_ && filled_nodes_++ % kNodesPerCheck == 0) cancel_->check();
     NodeRef octants[8];
     const size_t used = numbers_.size();
     for (int o = 0; o < 8; ++o) {
@@ -186,6 +189,10 @@ class Filler {
 
   static constexpr uint32_t kOutside = 1;
 
+  static constexpr uint64_t kNodesPerCheck = 1024;
+
+  const CancelToken* const cancel_;
+  uint64_t filled_nodes_ = 0;
   PooledMemory& memory_;
   const SpaceLabels& labels_;
   const bool keeps_closed_;
@@ -199,8 +206,9 @@ class Filler {
 }  // namespace
 
 void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
-                   std::span<const uint8_t> is_outside, SubDagTables& tables) {
-  Filler(memory, labels, false, tables).run(is_outside);
+                   std::span<const uint8_t> is_outside, SubDagTables& tables,
+                   const CancelToken* cancel) {
+  Filler(memory, labels, false, tables, cancel).run(is_outside);
 }
 
 void fill_from_seed(PooledMemory& memory, SpaceLabels& labels, std::span<const uint8_t> is_outside,

@@ -15,9 +15,10 @@ namespace voxdag {
 
 // Adds the filled sub-DAG to `tables`, which must be empty and have the size of the root's cube.
 // is_outside[c] is 1 if component c of the root reaches the outside, otherwise 0. Throws
-// OutOfBudget.
+// OutOfBudget, and Error{kCanceled} if `cancel` is not null.
 void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
-                   std::span<const uint8_t> is_outside, SubDagTables& tables);
+                   std::span<const uint8_t> is_outside, SubDagTables& tables,
+                   const CancelToken* cancel = nullptr);
 
 // Like fill_enclosed(), but does not fill components that have no voxel at the faces of the root's
 // cube. If the voxel `seed` is in such a component, this component is filled nevertheless.

@@ -45,7 +45,8 @@ class SpaceLabeler {
   SpaceLabeler(PooledMemory& memory, SpaceLabels& out)
       : memory_(memory), levels_(out.levels_), out_(out), relations_(memory, out) {}
 
-  void run() {
+  void run(const CancelToken* cancel) {
+    cancel_ = cancel;
     const int bricks = levels_.brick_depth();
     out_.depths_.resize(static_cast<size_t>(bricks) + 1);
     label_bricks(out_.depths_.back());
@@ -62,6 +63,11 @@ class SpaceLabeler {
   }
 
  private:
+  void check_cancel(uint64_t row) const {
+    constexpr uint64_t kRowsPerCheck = 1024;
+    if (cancel_ && row % kRowsPerCheck == 0) cancel_->check();
+  }
+
   // Completes a row after its components were appended to `depth.touch`, which then has `used`
   // elements. `open`: the faces at which all voxels are empty.
   void end_row(SpaceLabels::Depth& depth, uint64_t row, uint64_t used, uint8_t open) {
@@ -79,6 +85,7 @@ class SpaceLabeler {
     depth.rows[0].first = 0;
     uint64_t used = 0;
     for (uint64_t row = 0; row < levels_.brick_rows; ++row) {
+      check_cancel(row);
       for_each_open_component(~levels_.bricks[row], [&](uint64_t component) {
         append(memory_, out_.brick_masks_, used, component);
         append(memory_, depth.touch, used++, brick_touch(component));
@@ -95,7 +102,10 @@ class SpaceLabeler {
     out.rows[0].first = 0;
     out.first_map = PooledArray<uint32_t>(memory_, rows);
     touch_used_ = maps_used_ = 0;
-    for (uint64_t row = 0; row < rows; ++row) label_node(depth, static_cast<uint32_t>(row), out);
+    for (uint64_t row = 0; row < rows; ++row) {
+      check_cancel(row);
+      label_node(depth, static_cast<uint32_t>(row), out);
+    }
   }
 
   void label_node(int depth, uint32_t row, SpaceLabels::Depth& out) {
@@ -257,6 +267,7 @@ class SpaceLabeler {
   const NodeLevels& levels_;
   SpaceLabels& out_;
   FaceRelations relations_;
+  const CancelToken* cancel_ = nullptr;
   uint64_t touch_used_ = 0, maps_used_ = 0;
   // A number for each component: an index in parents_, or kNone. The components of the node's
   // octants are first and have the numbers 0, 1, .... While join() descends, the components of
@@ -273,8 +284,9 @@ std::vector<uint8_t> connected_components(PooledMemory& memory, SpaceLabels& lab
   return SpaceLabeler(memory, labels).connected(depth, row, octant, component);
 }
 
-SpaceLabels::SpaceLabels(PooledMemory& memory, const NodeLevels& levels) : levels_(levels) {
-  SpaceLabeler(memory, *this).run();
+SpaceLabels::SpaceLabels(PooledMemory& memory, const NodeLevels& levels, const CancelToken* cancel)
+    : levels_(levels) {
+  SpaceLabeler(memory, *this).run(cancel);
 }
 
 }  // namespace voxdag

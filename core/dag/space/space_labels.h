@@ -18,6 +18,7 @@
 
 #include "core/dag/space/brick_space.h"
 #include "core/dag/space/node_levels.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 
@@ -27,8 +28,9 @@ class SpaceLabels {
 
   // `levels` must outlive this object. Throws OutOfBudget if the memory is too small, or if a node
   // has too many components for 16 bits. Neither happens for a cube with the edge kSmallestEdge and
-  // a budget of kSmallestBudget (core/backend/backend.h).
-  SpaceLabels(PooledMemory& memory, const NodeLevels& levels);
+  // a budget of kSmallestBudget (core/backend/backend.h). If `cancel` is not null, also throws
+  // Error{kCanceled}.
+  SpaceLabels(PooledMemory& memory, const NodeLevels& levels, const CancelToken* cancel = nullptr);
 
   const NodeLevels& levels() const { return levels_; }
   // Returns the number of components of a node or brick.

@@ -166,4 +166,21 @@ void BandTile::distances_to(bool is_set, const Position& at, BandSquares& out) {
         out[(x * n + y) * n + z] = static_cast<int16_t>(std::min(to_[(z * n + y) * n + x], limit));
 }
 
+bool has_inside(const DagView& dag, const CancelToken& cancel) {
+  // Of the cells around a set cell, the farthest that can be empty has the (2 distance)^2 3.
+  constexpr int kFarthest = 3, kWidth = 2;
+  bool found = false;
+  BandSquares squares;
+  for_each_band_part(
+      dag, {dag.grid_levels(), whole_grid(dag.grid_levels())}, kWidth,
+      [&](const Position&, const Position& at, BandTile& tile) {
+        cancel.check();
+        tile.distances(at, squares);
+        found = std::ranges::any_of(squares, [](int16_t square) { return square < -kFarthest; });
+        return !found;
+      },
+      [&](const Position&, int64_t) { return !(found = true); });
+  return found;
+}
+
 }  // namespace voxdag::query

@@ -21,6 +21,7 @@
 
 #include "query/dag/dag_view.h"
 #include "query/lookup/bricks.h"
+#include "voxdag/cancel_token.h"
 #include "voxdag/cells.h"
 
 namespace voxdag::query {
@@ -104,7 +105,8 @@ class BandWalk {
     }
     const BandTile::Contents contents = contents_of(dag_, levels_, box);
     if (contents == BandTile::Contents::kEmpty) return true;
-    if (contents == BandTile::Contents::kFull) return visit_full_(low, edge);
+    if (contents == BandTile::Contents::kFull && domain_.contains(low, edge))
+      return visit_full_(low, edge);
     if (edge == tile_.edge()) return visit_tile(low);
     for (int i = 0; i < 8; ++i)
       if (!enter(child_corner(low, i, edge / 2), edge / 2)) return false;
@@ -122,8 +124,9 @@ class BandWalk {
           const Position at = {x, y, z};
           const BandTile::Contents contents = tile_.contents(at);
           if (contents == BandTile::Contents::kEmpty) continue;
-          if (!(contents == BandTile::Contents::kFull ? visit_full_(leaf, kBandLeafEdge)
-                                                      : visit_leaf_(leaf, at, tile_)))
+          const bool is_full =
+              contents == BandTile::Contents::kFull && domain_.contains(leaf, kBandLeafEdge);
+          if (!(is_full ? visit_full_(leaf, kBandLeafEdge) : visit_leaf_(leaf, at, tile_)))
             return false;
         }
     return true;
@@ -139,13 +142,16 @@ class BandWalk {
 };
 
 // Visits the parts of a level set: calls visit_leaf(low, at, tile) for each leaf with cells in the
-// band; tile.distances(at) computes its distances. Calls visit_full(low, edge) for each cube of set
-// cells that are all farther from the surface than `width`. Leaves and cubes can extend beyond
-// band_domain(). Both functions return a bool; false ends the walk.
+// band, and for each leaf of set cells that extends beyond band_domain(); tile.distances(at)
+// computes its distances. Calls visit_full(low, edge) for each other cube of set cells that are all
+// farther from the surface than `width`. Both functions return a bool; false ends the walk.
 template <class VisitLeaf, class VisitFull>
 void for_each_band_part(const DagView& dag, const Selection& selection, int width,
                         const VisitLeaf& visit_leaf, const VisitFull& visit_full) {
   BandWalk(dag, selection, width, visit_leaf, visit_full).run();
 }
+
+// True if a set cell of the DAG's grid has only set cells around it: 26 cells.
+bool has_inside(const DagView& dag, const CancelToken& cancel);
 
 }  // namespace voxdag::query

@@ -13,8 +13,9 @@ constexpr const char* kFilledMemory = "the search for enclosed space (--outside)
 // Reads the levels of a DAG, from the bricks upwards.
 class LevelReader {
  public:
-  LevelReader(const DagView& dag, uint32_t grid_levels, PooledMemory& memory)
-      : dag_(dag), depth_(grid_levels - kBrickLevels), memory_(memory) {}
+  LevelReader(const DagView& dag, uint32_t grid_levels, PooledMemory& memory,
+              const CancelToken& cancel)
+      : dag_(dag), depth_(grid_levels - kBrickLevels), memory_(memory), cancel_(cancel) {}
 
   NodeLevels read() {
     read_bricks();
@@ -28,7 +29,9 @@ class LevelReader {
   template <class Visit>
   void for_each_node(uint32_t depth, const Visit& visit) const {
     const bool wide = dag_.level(depth + 1).wide;
+    uint64_t nodes = 0;
     for (uint64_t at = 0; at < dag_.level(depth).words.size();) {
+      if (nodes++ % kNodesPerCheck == 0) cancel_.check();
       const DagView::Children children = dag_.children_of_node(depth, at);
       visit(at, children);
       at += 1 + (static_cast<uint64_t>(popcount8(children.mask)) << wide);
@@ -63,6 +66,7 @@ class LevelReader {
   void read_nodes(uint32_t depth) {
     NodeLevels::Level& level = levels_.nodes[depth];
     const uint64_t words = dag_.level(depth).words.size();
+    if (words > UINT32_MAX) throw OutOfBudget();
     PooledArray<uint32_t> rows = row_numbers(depth);
     level.masks = PooledArray<uint8_t>(memory_, words / 2 + 1);
     level.first_child = PooledArray<uint32_t>(memory_, words / 2 + 1);
@@ -88,7 +92,10 @@ class LevelReader {
 
   const DagView& dag_;
   const uint32_t depth_;  // depth of the bricks
+  static constexpr uint64_t kNodesPerCheck = 4096;
+
   PooledMemory& memory_;
+  const CancelToken& cancel_;
   NodeLevels levels_;
   PooledArray<uint32_t> rows_;  // rows of the level that was read last
 };
@@ -137,15 +144,15 @@ class WordLevels : public SubDagSink {
 };
 
 std::vector<PageBuffer<uint32_t>> filled_levels(const DagView& dag, uint32_t grid_levels,
-                                                MemoryBudget& budget) {
+                                                MemoryBudget& budget, const CancelToken& cancel) {
   PagePool pool;
   PooledMemory memory{budget, pool};
-  const NodeLevels levels = LevelReader(dag, grid_levels, memory).read();
-  const SpaceLabels labels(memory, levels);
+  const NodeLevels levels = LevelReader(dag, grid_levels, memory, cancel).read();
+  const SpaceLabels labels(memory, levels, &cancel);
   // The faces of the root's cube are the border of the grid, so all labeled components are outside.
   const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);
   SubDagTables tables(memory, static_cast<int>(grid_levels));
-  fill_enclosed(memory, labels, is_outside, tables);
+  fill_enclosed(memory, labels, is_outside, tables, &cancel);
   WordLevels words(budget);
   emit_levels(tables, {0, grid_levels, 64}, words);
   return words.finish();
@@ -154,9 +161,9 @@ std::vector<PageBuffer<uint32_t>> filled_levels(const DagView& dag, uint32_t gri
 }  // namespace
 
 FilledDag::FilledDag(const DagView& dag, uint32_t grid_levels, const std::string& path,
-                     MemoryBudget& budget) {
+                     MemoryBudget& budget, const CancelToken& cancel) {
   try {
-    levels_ = filled_levels(dag, grid_levels, budget);
+    levels_ = filled_levels(dag, grid_levels, budget, cancel);
   } catch (const OutOfBudget&) {
     throw Error(ErrorCode::kOutOfMemory,
                 std::string("out of memory: ") + kFilledMemory +

@@ -49,9 +49,14 @@ VdbSize level_set_size(const ExportJob& job, const Selection& selection, const V
 }
 
 // Returns the level set of the selected voxels. Leaves have exact distances, limited to the width
-// of the band. Tiles have only the right sign. Throws Error{kInvalidInput} if the voxels are a
-// surface without an inside.
+// of the band. Tiles have only the right sign. Throws Error{kInvalidInput} if the file's voxels are
+// a surface without an inside.
 inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t leaves) {
+  if (!has_inside(job.dag, job.cancel))
+    throw Error(ErrorCode::kInvalidInput,
+                job.file.path() +
+                    ": the voxels are a surface without an inside, so --grid sdf has no signs: "
+                    "expected a file of voxdag build --solid RULE, or --grid density");
   const int width = band_of(job), limit = 4 * width * width;
   const Region domain = band_domain(job.selection, width);
   const auto background = static_cast<float>(width * job.cell_edge());
@@ -61,8 +66,6 @@ inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t lea
   std::vector<float> distances(static_cast<size_t>(limit) + 1);  // by (2 distance)^2
   for (int i = 0; i <= limit; ++i)
     distances[static_cast<size_t>(i)] = static_cast<float>(std::sqrt(i) / 2 * job.cell_edge());
-  // A set cell at least 1.5 cells from the surface: all 26 cells around it are set.
-  bool has_inside = false;
   ExportStage stage(job, "build grid", leaves, "leaves");
   openvdb::FloatGrid::Accessor accessor = grid->getAccessor();
   BandSquares squares;
@@ -79,26 +82,16 @@ inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t lea
             continue;
           leaf->setValueOnly(i, squares[i] < 0 ? -distance : distance);
           leaf->setActiveState(i, square < limit);
-          has_inside = has_inside || squares[i] < -3;
         }
         stage.advance(1);
         return true;
       },
       [&](const Position& low, int64_t edge) {
-        Region cube{low, {low[0] + edge, low[1] + edge, low[2] + edge}};
-        for (size_t a = 0; a < 3; ++a) {
-          cube.low[a] = std::max(cube.low[a], domain.low[a]);
-          cube.high[a] = std::min(cube.high[a], domain.high[a]) - 1;
-        }
-        grid->tree().sparseFill({vdb_coord(cube.low), vdb_coord(cube.high)}, -background, false);
-        has_inside = true;
+        job.cancel.check();
+        const Position last = {low[0] + edge - 1, low[1] + edge - 1, low[2] + edge - 1};
+        grid->tree().sparseFill({vdb_coord(low), vdb_coord(last)}, -background, false);
         return true;
       });
-  if (!has_inside)
-    throw Error(ErrorCode::kInvalidInput,
-                job.file.path() +
-                    ": the voxels are a surface without an inside, so --grid sdf has no signs: "
-                    "expected a file of voxdag build --solid RULE, or --grid density");
   return grid;
 }
 

@@ -168,6 +168,27 @@ TEST_F(LevelSetTest, DistancesEqualTheOracle) {
 TEST_F(LevelSetTest, AlignedCubesHaveABand) {
   write(voxels_where(5, [](int x, int y, int z) { return x >= 8 && x < 24 && y >= 16 && z < 16; }));
   expect_right({5, whole_grid(5)}, 2);
+  expect_right({5, {{9, 17, 1}, {22, 30, 15}}}, 2);  // cuts a full cube
+}
+
+// Regions without 3^3 set voxels have signs if the file has an inside.
+TEST_F(LevelSetTest, ThinRegionsOfASolid) {
+  write(voxels_where(5, [](int x, int, int) { return x < 17; }));
+  EXPECT_TRUE(has_inside(*dag_, CancelToken{}));
+  expect_right({5, {{16, 0, 0}, {32, 32, 32}}}, 3);
+  NoProgress none;
+  const ExportReport report = export_dag(system_files(), *file_,
+                                         {&export_format("vdb"),
+                                          {5, {{16, 0, 0}, {32, 32, 32}}},
+                                          folder_.file("thin"),
+                                          64 << 20,
+                                          false,
+                                          true,
+                                          {.grid = "sdf"}},
+                                         none, CancelToken{});
+  EXPECT_EQ(report.voxels, 32u * 32u);
+  write(voxels_where(5, [](int x, int, int) { return x == 15 || x == 16; }));
+  EXPECT_FALSE(has_inside(*dag_, CancelToken{}));
 }
 
 // If the voxels are the cells whose centers are in a ball, all distances are within a voxel of the

@@ -13,6 +13,7 @@
 #include "query/export/chunks/export_chunks.h"
 #include "query/export/outside/filled_dag.h"
 #include "query/lookup/bricks.h"
+#include "tests/support/error_of.h"
 #include "tests/unit/query/export/corners.h"
 #include "tests/unit/query/query_files.h"
 
@@ -317,7 +318,15 @@ TEST_F(SurfaceMeshTest, LargeGridsHaveFloats) {
 
 TEST_F(SurfaceMeshTest, FillingNeedsMemory) {
   MemoryBudget little(1000);
-  EXPECT_THROW(FilledDag(DagView(*file_), 5, "a.vdag", little), Error);
+  EXPECT_THROW(FilledDag(DagView(*file_), 5, "a.vdag", little, CancelToken{}), Error);
+}
+
+TEST_F(SurfaceMeshTest, FillingCanBeCanceled) {
+  MemoryBudget budget(64 << 20);
+  CancelToken canceled;
+  canceled.cancel();
+  EXPECT_EQ(error_of([&] { FilledDag(DagView(*file_), 5, "a.vdag", budget, canceled); }).code(),
+            ErrorCode::kCanceled);
 }
 
 TEST_F(SurfaceMeshTest, OtherFormatsHaveNoSuchOptions) {
