@@ -11,6 +11,7 @@
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "query/dag/dag_view.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 
