@@ -127,7 +127,7 @@ TEST_F(BuildProtection, TheReserveStopsABuildThatResumes) {
     run_build(reserved, context());
   });
   EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
-  EXPECT_NE(error.message().find("reserved"), std::string::npos) << error.message();
+  EXPECT_NE(error.message().find("must stay free"), std::string::npos) << error.message();
   EXPECT_FALSE(std::filesystem::exists(output()));
   reserved.run.min_free_bytes = 0;
   EXPECT_NO_THROW(run_build(reserved, context()));
