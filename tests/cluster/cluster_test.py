@@ -195,7 +195,7 @@ class ClusterTest(unittest.TestCase):
         _, messages = self.end(build)
         self.assertNotEqual(build.returncode, 0)
         self.assertIn("it has failed 2 times", messages)
-        self.assertIn("batch-0.vdbatch", messages)
+        self.assertIn(batch.name, messages)
 
     @slow
     def test_a_lost_node(self):
