@@ -167,7 +167,8 @@ void BandTile::distances_to(bool is_set, const Position& at, BandSquares& out) {
 }
 
 bool has_inside(const DagView& dag, const CancelToken& cancel) {
-  // Of the cells around a set cell, the farthest that can be empty has the (2 distance)^2 3.
+  // (2 distance)^2 of a cell whose nearest empty cell is a neighbor across a corner. Cells with a
+  // larger number have only set cells around them.
   constexpr int kFarthest = 3, kWidth = 2;
   bool found = false;
   BandSquares squares;

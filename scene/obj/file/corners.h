@@ -55,8 +55,8 @@ inline bool next_corner(std::string_view& arguments, Corner& out) {
 // Facts about the corners of a face, which the first pass over the file collects.
 struct FaceCorners {
   size_t count = 0;  // number of corners
-  bool lacks_texture =
-      false;  // true if a corner has no texture coordinates, or an index before the first
+  // True if a corner has no texture coordinates, or an index before the first.
+  bool lacks_texture = false;
   int64_t max_texture = 0;  // the largest index of texture coordinates, which counts from 1
 };
 

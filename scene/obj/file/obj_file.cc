@@ -196,22 +196,31 @@ void ObjFile::add_warnings(const Scan& scan) {
   add("unknown-statements", scan.unknown, unknown.c_str());
 }
 
+// Reads all faces of the file, one after the other. Calls visit() after each.
+template <class Visit>
+void ObjFile::for_each_polygon(PolygonReader& polygons, const CancelToken& cancel,
+                               const Visit& visit) const {
+  polygons.seek(face_index_.at(0), 0);
+  for (uint64_t face = 0; face < faces_; ++face) {
+    if (face % kStatementsPerCheck == 0) cancel.check();
+    polygons.next();
+    visit();
+  }
+}
+
 // Counts again, for each material, the faces that lack texture coordinates. The first pass cannot
 // count faces whose indices exceed the number of vt statements, because vt statements may follow a
 // face.
 void ObjFile::count_faces_without_texture(MemoryBudget& budget, const CancelToken& cancel) {
   for (UsedMaterials::Use& use : materials_.all()) use.faces_without_texture = 0;
   PolygonReader polygons(*this, budget);
-  polygons.seek(face_index_.at(0), 0);
-  for (uint64_t face = 0; face < faces_; ++face) {
-    if (face % kStatementsPerCheck == 0) cancel.check();
-    polygons.next();
-    if (polygons.size() < 3) continue;
+  for_each_polygon(polygons, cancel, [&] {
+    if (polygons.size() < 3) return;
     bool lacks_texture = false;
     for (size_t k = 0; k < polygons.size(); ++k)
       lacks_texture = lacks_texture || polygons.texcoord(k) >= texcoords_;
     if (lacks_texture) ++materials_.all()[polygons.material()].faces_without_texture;
-  }
+  });
 }
 
 // Sets has_splits of each block of faces (block_index.h) that has a face which cannot be
@@ -222,15 +231,12 @@ void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   polygon::FaceSplitter splitter(vertices, file_->path(), 1, budget);
   uint64_t doubtful = 0;
   std::string first_doubtful;
-  polygons.seek(face_index_.at(0), 0);
-  for (uint64_t face = 0; face < faces_; ++face) {
-    if (face % kStatementsPerCheck == 0) cancel.check();
-    polygons.next();
-    if (polygons.size() < 4) continue;
+  for_each_polygon(polygons, cancel, [&] {
+    if (polygons.size() < 4) return;
     if (!splitter.split(polygons.vertices()).empty())
-      has_splits_ = face_index_.at(face).has_splits = true;
+      has_splits_ = face_index_.at(polygons.face()).has_splits = true;
     if (splitter.is_doubtful() && doubtful++ == 0) first_doubtful = polygons.place();
-  }
+  });
   if (doubtful > 0)
     warnings_.add(
         polygon::crossing_edges(file_->path() + ": " + first_doubtful, "its edges", doubtful));

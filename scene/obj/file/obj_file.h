@@ -19,6 +19,8 @@
 
 namespace voxdag::obj {
 
+class PolygonReader;
+
 class ObjFile {
  public:
   // Throws Error{kInvalidInput} with the line for a free-form curve or surface, a call of another
@@ -65,6 +67,9 @@ class ObjFile {
   class Scan;
 
   void add_warnings(const Scan& scan);
+  template <class Visit>
+  void for_each_polygon(PolygonReader& polygons, const CancelToken& cancel,
+                        const Visit& visit) const;
   void count_faces_without_texture(MemoryBudget& budget, const CancelToken& cancel);
   void find_splits(MemoryBudget& budget, const CancelToken& cancel);
 

@@ -1,6 +1,5 @@
 #include "scene/obj/materials/mtl_reader.h"
 
-#include <algorithm>
 #include <unordered_map>
 
 #include "scene/messages.h"
@@ -25,10 +24,8 @@ class LibraryReader {
       const std::string_view keyword = next_word(arguments);
       if (equals_in_any_case(keyword, "newmtl"))
         begin_material(trimmed(arguments));
-      else if (current_ != kNone)
+      else
         read_statement(keyword, trimmed(arguments));
-      else if (is_color_statement(keyword))
-        warn("missing-material", printable(keyword) + " precedes the first newmtl; it is ignored");
     }
     return std::move(materials_);
   }
@@ -36,13 +33,6 @@ class LibraryReader {
  private:
   static constexpr size_t kNone = ~size_t{0};
   static constexpr uint64_t kNodeBytes = 96;  // bytes of a hash table's node
-
-  // True if read_statement() reads statements with this keyword.
-  static bool is_color_statement(std::string_view keyword) {
-    constexpr std::string_view kColorKeywords[] = {"Kd", "d", "Tr", "map_Kd", "map_d"};
-    return std::ranges::any_of(
-        kColorKeywords, [&](std::string_view name) { return equals_in_any_case(keyword, name); });
-  }
 
   void begin_material(std::string_view name) {
     if (name.empty()) warn("missing-material", "newmtl has no name; no face can use its material");
@@ -59,23 +49,29 @@ class LibraryReader {
     materials_[current_].name = name;
   }
 
+  // Ignores statements that do not affect colors.
   void read_statement(std::string_view keyword, std::string_view arguments) {
-    LibraryMaterial& material = materials_[current_];
-    const auto is = [&](std::string_view name) { return equals_in_any_case(keyword, name); };
-    if (is("Kd"))
-      read_diffuse(arguments, material);
-    else if (is("d"))
-      material.is_dissolved = read_opacity(keyword, arguments, material);
-    else if (is("Tr") && !material.is_dissolved && read_opacity(keyword, arguments, material))
-      material.opacity = 1 - material.opacity;
-    else if (is("map_Kd"))
-      material.diffuse_map = read_map(keyword, arguments);
-    else if (is("map_d"))
-      material.opacity_map = read_map(keyword, arguments);
+    struct Statement {
+      std::string_view keyword;
+      void (LibraryReader::*read)(std::string_view keyword, std::string_view arguments,
+                                  LibraryMaterial& material);
+    };
+    static constexpr Statement kStatements[] = {{"Kd", &LibraryReader::read_diffuse},
+                                                {"d", &LibraryReader::read_dissolve},
+                                                {"Tr", &LibraryReader::read_transparency},
+                                                {"map_Kd", &LibraryReader::read_diffuse_map},
+                                                {"map_d", &LibraryReader::read_opacity_map}};
+    for (const Statement& statement : kStatements) {
+      if (!equals_in_any_case(keyword, statement.keyword)) continue;
+      if (current_ == kNone)
+        return warn("missing-material",
+                    printable(keyword) + " precedes the first newmtl; it is ignored");
+      return (this->*statement.read)(keyword, arguments, materials_[current_]);
+    }
   }
 
   // Reads "Kd r g b"; missing numbers equal the first.
-  void read_diffuse(std::string_view arguments, LibraryMaterial& material) {
+  void read_diffuse(std::string_view, std::string_view arguments, LibraryMaterial& material) {
     std::array<double, 3> numbers;
     const size_t count = read_numbers(arguments, numbers.data(), numbers.size());
     if (count == 0)
@@ -87,6 +83,28 @@ class LibraryReader {
 
   static std::string shown(std::string_view arguments) {
     return arguments.empty() ? "nothing" : printable(arguments);
+  }
+
+  void read_dissolve(std::string_view keyword, std::string_view arguments,
+                     LibraryMaterial& material) {
+    material.is_dissolved = read_opacity(keyword, arguments, material);
+  }
+
+  // A statement d takes precedence.
+  void read_transparency(std::string_view keyword, std::string_view arguments,
+                         LibraryMaterial& material) {
+    if (!material.is_dissolved && read_opacity(keyword, arguments, material))
+      material.opacity = 1 - material.opacity;
+  }
+
+  void read_diffuse_map(std::string_view keyword, std::string_view arguments,
+                        LibraryMaterial& material) {
+    material.diffuse_map = read_map(keyword, arguments);
+  }
+
+  void read_opacity_map(std::string_view keyword, std::string_view arguments,
+                        LibraryMaterial& material) {
+    material.opacity_map = read_map(keyword, arguments);
   }
 
   bool read_opacity(std::string_view keyword, std::string_view arguments,
