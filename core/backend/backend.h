@@ -57,8 +57,8 @@ struct SubvolumeTask {
   Cube cube;                 // its level is at most L-2
   uint32_t hash_bits = 64;   // 4 to 64
   // If not null, build() also fills the interior of the solid (core/geometry/solid_rule.h). `solid`
-  // then has the solid's rule, and the views at the cube's low faces. Only the CPU backend fills
-  // solids.
+  // then has the solid's rule, and for each sample row its view (solid_rule.h) at the cube's low
+  // face. Only the CPU backend fills solids.
   const SolidEntry* solid = nullptr;
   VoxelRule rule = VoxelRule::kShell;  // must be kShell if `solid` is set
 

@@ -26,8 +26,8 @@ inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
 // The CPU times of this process's threads, which show whether a stage keeps all threads busy. A
-// thread adds its time when it ends. There is one entry for each worker number of parallel_for(),
-// which its threads in all calls share, and one entry that all background threads share.
+// thread adds its time when it ends. All threads of parallel_for() with the same worker number
+// share one entry, also in different calls. All background threads share one entry.
 class ThreadTimes {
  public:
   static constexpr size_t kThreads = 257;  // entries: workers 0 to 255, and background threads

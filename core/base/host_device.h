@@ -10,7 +10,8 @@
 #define VOXDAG_HD
 #endif
 
-// VOXDAG_SSE2 is defined where code may use SSE2: on every x86-64 CPU, but not in device code.
+// VOXDAG_SSE2 is defined where code can use SSE2, which is on every x86-64 CPU, but not in device
+// code.
 #if defined(__SSE2__) && !defined(__CUDA_ARCH__)
 #define VOXDAG_SSE2
 #endif

@@ -4,8 +4,8 @@
 //
 // Invariants:
 //   1. used() <= limit() at any time.
-//   2. A budget may be a share of another budget, its parent. Every charge is then also charged to
-//      the parent.
+//   2. A budget can be a share of another budget, its parent. Every charge of the share is then
+//      also charged to the parent.
 //
 // Thread-safe.
 #pragma once

@@ -78,7 +78,7 @@ class SqlDatabase {
 // True if a database has no tables, no application id and no schema version.
 bool is_new(SqlDatabase& database);
 
-// A commit with kNow survives a power cut. A commit with kLater may be lost in a power cut until
+// A commit with kNow survives a power cut. A commit with kLater can be lost in a power cut until
 // the next commit with kNow.
 enum class Durable { kNow, kLater };
 

@@ -1,5 +1,6 @@
-// Descends the octree with a triangle: finds the children of a cube that the triangle touches.
-// Exact (closed triangle, closed cube), so every way of walking the tree finds the same cubes.
+// Descends the octree with a triangle: finds the children of a cube that the triangle touches. The
+// test is exact for a closed triangle and closed cubes, so every way of walking the tree finds the
+// same cubes.
 #pragma once
 
 #include <cstdint>

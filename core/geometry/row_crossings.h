@@ -124,8 +124,8 @@ struct SampleRows {
   struct Range {
     int low, high;
   };
-  // Returns the range of the rows' indices along `axis`, which is one of the two axes across the
-  // rows, for which the rows' coordinate is within the triangle's bounding box.
+  // Returns the range of the indices of rows whose coordinate along `axis` is within the triangle's
+  // bounding box. `axis` is one of the two axes across the rows.
   Range rows_of(const FixedTriangle& t, int axis) const {
     const int64_t from = t.low(axis) - low[axis], to = t.high(axis) - low[axis];
     if (to < 0 || from > int64_t{blocks} << pitch_log2) return {1, 0};

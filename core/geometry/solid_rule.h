@@ -15,11 +15,12 @@
 //   winding  view = left - (total - left)
 //   parity   view = (left mod 2) + ((total - left) mod 2)
 //
-// A corner has the sum of its three views. A unit with k corners is inside iff the absolute sum
-// over its corners is > 3 k. If every direction counts as 0 (outside) or 1 (inside), more than half
-// of the 6 k directions must count as 1.
+// Each corner contributes the sum of its three views. A unit with k corners is inside iff the
+// absolute value of the sum over all its corners is > 3 k. A view has two directions. If every
+// direction counts as 0 (outside) or 1 (inside), this means that more than half of the 6 k
+// directions count as 1.
 //
-// A component without a corner of its block is blind. Its views come from a walk to the component
+// A component without a corner of its block is *blind*. Its views come from a walk to the component
 // from the block's low corner (BlindComponent in core/backend/cpu/solid).
 #pragma once
 

@@ -110,9 +110,9 @@ class FileSystem {
   // lock.
   virtual std::unique_ptr<FileLock> try_lock(const std::string& path) = 0;
   // True if a process holds the lock of the file at `path`, which must be readable. The check takes
-  // the lock for a moment, so a try_lock() that runs concurrently may fail.
+  // the lock for a moment, so a try_lock() that runs concurrently can fail.
   virtual bool is_locked(const std::string& path) = 0;
-  // Returns the number of bytes that an unprivileged user may still write to the file system of
+  // Returns the number of bytes that an unprivileged user can still write to the file system of
   // `path`.
   virtual uint64_t free_space(const std::string& path) = 0;
   // Returns the device number of the file system of `path`. Paths with equal numbers share one

@@ -151,7 +151,7 @@ class GroupCursor {
   std::span<uint32_t> positions_;
   uint64_t next_word_;  // first word of the file that is not read yet
   uint64_t rows_left_;
-  size_t at_ = 0, filled_ = 0;  // word indices in buffer_: the current row, the end
+  size_t at_ = 0, filled_ = 0;  // word indices in buffer_: current row, end of the rows
   uint64_t stored_ = 0;         // rows whose positions were stored in maps_
   size_t pending_ = 0;          // words in positions_ that are not stored yet
 };

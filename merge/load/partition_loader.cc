@@ -52,9 +52,10 @@ class HashPartition::Loader {
     }
   }
 
-  // Returns the work items: consecutive frames of one slice each. slice_of_item[i] is the index of
-  // the slice of item i. If the position maps are in a scratch file, an item has all frames of its
-  // slice, so that the map of the slice's run is loaded only once.
+  // Returns the work items. Each item is a range of consecutive frames of one slice.
+  // slice_of_item[i] is the index of the slice of item i. If the position maps are in a scratch
+  // file, an item has all frames of its slice, so that the map of the slice's run is loaded only
+  // once.
   std::vector<FrameSpan> items(std::vector<size_t>& slice_of_item) const {
     std::vector<FrameSpan> spans;
     for (size_t s = 0; s < partition_.slices_.size(); ++s) {

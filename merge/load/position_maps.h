@@ -3,8 +3,8 @@
 // Parents refer to positions. Positions increase with the row, so a run is still in the total order
 // after its children are replaced by their positions. A position is one word, or two in wide maps
 // (put_position()). The maps of all runs are stored one after the other. They are in memory if they
-// fit a limit, and otherwise in a scratch file. From this file, one run's map, or a part of it, is
-// loaded on demand.
+// fit a limit, and otherwise in a scratch file. One run's map, or a part of it, is loaded from this
+// file on demand.
 //
 // Several threads may store different rows concurrently. Load only after the last store.
 #pragma once

@@ -3,11 +3,11 @@
 //   row             one node or brick of one artifact: hash, mask and words
 //   run             the rows of one level of one artifact (or of the top tree), in the total order
 //   frame           a block of up to kFrameRows consecutive rows of a run, as artifacts store them
-//   hash partition  a contiguous range of the hash space, merged as one unit: its rows
-//                   from all runs are in memory together
+//   hash partition  a contiguous range of the hash space, merged as one unit: the rows of
+//                   all runs in this range are in memory together
 //   bucket          an equal share of a hash partition's range, whose rows one thread sorts
-//   position        place of a row in the merged level: a word offset in the global file,
-//                   an index in an artifact
+//   position        place of a row in the merged level: its word offset if the level is in the
+//                   global file, its index if the level is in an artifact
 //
 // A node's words are its children, one word each. In a wide level a child takes two words, the high
 // half first. A brick is represented as a node of mask 3 whose two words are the high and the low

@@ -1,5 +1,5 @@
-// The output of a merge pass, level by level: the global file in the final pass, an artifact in
-// earlier ones.
+// The output of a merge pass, level by level. The final pass writes the global file. Earlier passes
+// write artifacts.
 #pragma once
 
 #include <cstdint>

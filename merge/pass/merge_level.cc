@@ -143,9 +143,9 @@ class PartitionMerge {
     turns_.end();
   }
 
-  // Returns the address for the positions of the bucket's rows in slice `s`. It is in the run's map
-  // if the maps are in memory, otherwise in the partition, from which store_positions() copies
-  // them.
+  // Returns the address for the positions of the bucket's rows in slice `s`. If the maps are in
+  // memory, the address is in the run's map. Otherwise it is in the partition, and
+  // store_positions() copies the positions from there to the map.
   uint32_t* positions_of(size_t bucket, size_t s) {
     const RunSlice& slice = partition_.slices()[s];
     const uint64_t row = partition_.bucket_begin(bucket, s).row;
@@ -198,7 +198,7 @@ LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
 
 // Called if the rows with this hash do not fit in a partition. Throws Error{kOutOfMemory} unless
 // they are in more than two frames of some run. The memory plan has space for two frames of every
-// run, so any smaller group should have fit.
+// run, so a group with at most two frames in each run should have fit.
 void check_group_is_large(const LevelTask& task, uint64_t hash) {
   for (const LevelRun* run : task.runs) {
     const FrameSpan frames = run->frames_within({hash, hash});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <string>
 
 #include "core/base/error.h"
 #include "merge/pass/merge_level.h"
@@ -25,8 +26,9 @@ class Pass {
     }
     if (task_.is_final && done_.placed.size() != 1)
       throw Error(ErrorCode::kCorrupt,
-                  "one artifact covers the complete grid and others a part of it: "
-                  "expected subvolumes that do not overlap");
+                  "the merge found " + std::to_string(done_.placed.size()) +
+                      " root nodes for the complete grid: expected exactly one, from subvolumes "
+                      "that do not overlap");
     return std::move(done_.roots);
   }
 
@@ -79,8 +81,8 @@ class Pass {
       memory_.release();
   }
 
-  // Returns the maximum number of positions (merge/load/row.h) that `rows` can take in the output:
-  // the number if no two rows are equal.
+  // Returns the maximum number of positions (merge/load/row.h) that `rows` can take in the output.
+  // They take this number if no two rows are equal.
   uint64_t max_positions(const RowCount& rows) const {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }

@@ -25,7 +25,7 @@ struct PassTask {
 struct PassProgress {
   std::optional<uint32_t> level;     // the last merged level; nullopt before the first
   std::optional<PositionMaps> maps;  // position maps of this level
-  bool wide = false;                 // true if references to rows of this level are wide
+  bool wide = false;                 // true if positions in this level take two words (row.h)
   std::vector<PlacedNode> placed;    // top nodes and subvolume roots of this level
   // Roots of the subvolumes in this level and below. `index` is the root's position in the output,
   // truncated to 32 bits.

@@ -1,6 +1,6 @@
 // The artifacts that the next merge pass reads. At first these are the inputs. A pass replaces the
-// artifacts that it merged by its output (intermediates). Also holds the intermediates' segment
-// files.
+// artifacts that it merged by the artifacts that it wrote (*intermediates*). This class also owns
+// the segment files of the intermediates.
 #pragma once
 
 #include <cstdint>

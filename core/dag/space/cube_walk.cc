@@ -14,10 +14,11 @@ namespace {
 
 constexpr int kNeighbors = 8;
 
-// The nodes of a cube and of its neighbors, in the order of CubeNeighbors, as numbers of
-// NeighborNodes. 0 means that the cube is empty.
+// The nodes of a cube and of its neighbors, in the order of CubeNeighbors. Each element is the
+// number that NeighborNodes gives the node, or 0 if the node's cube is empty.
 using Neighborhood = std::array<uint32_t, kNeighbors>;
 
+// The result of NeighborFilter::filter() for a neighborhood.
 struct FilteredNode {
   Neighborhood key{};
   uint64_t hash = 0;
@@ -27,7 +28,7 @@ struct FilteredNode {
   bool is_used = false;
 };
 
-// Hash table of the results for the neighborhoods of one depth, so that each result is computed
+// Hash table of the results for all neighborhoods of one depth, so that each result is computed
 // once. If there is not enough memory for a larger table, add() empties the table. Removed results
 // are computed again when they are needed.
 class FilteredNodes {
@@ -134,6 +135,7 @@ class NeighborNodes {
   std::vector<Source> sources_;
 };
 
+// The set that a NeighborFilter computes: blocked positions or enclosed voxels (cube_walk.h).
 enum class WalkFilter { kBlocked, kEnclosed };
 
 class NeighborFilter {

@@ -60,9 +60,9 @@ class FaceReader {
   size_t at_ = 0;
 };
 
-// Calls unite(label_a, label_b) for each pair of a component of one square and a component of the
-// other square that touch. `in_a` and `in_b` are the squares that `a` and `b` have just read. Also
-// reads or skips the quadrants of these squares. `depth` is the depth of the recursion.
+// Calls unite(label_a, label_b) for each two components that touch, one in each square. `in_a` and
+// `in_b` are the squares that `a` and `b` have just read. Also reads or skips the quadrants of
+// these squares. `depth` is the depth of the recursion.
 template <class Unite>
 void join_squares(FaceReader& a, const FaceReader::Square& in_a, FaceReader& b,
                   const FaceReader::Square& in_b, const Unite& unite, int depth = 0) {

@@ -1,5 +1,5 @@
-// Takes two nodes whose cubes have a common face, and finds the pairs of a component
-// (space_labels.h) of one node and a component of the other node that meet at this face.
+// Takes two nodes whose cubes have a common face. Finds all pairs of components (space_labels.h),
+// one of each node, that meet at this face.
 //
 // The pairs are computed from the pairs of the octants at the face. A cache remembers the pairs of
 // recent nodes, because equal nodes are often neighbors of equal nodes. The cache only saves time:
@@ -31,8 +31,8 @@ class FaceRelations {
   FaceRelations(PooledMemory& memory, const SpaceLabels& labels);
 
   // Returns the pairs of two nodes or bricks at rows `low` and `high` of a depth. The cube of `low`
-  // is the lower neighbor, along `axis`, of the cube of `high`. Returns nullopt if one of them, or
-  // of the smaller cubes at the face, has more than kMaxComponents components.
+  // is the lower neighbor, along `axis`, of the cube of `high`. Returns nullopt if one of the two
+  // nodes, or one of the smaller cubes at the face, has more than kMaxComponents components.
   std::optional<Meeting> find(int depth, uint32_t low, uint32_t high, int axis);
 
  private:

@@ -208,7 +208,7 @@ class SpaceLabeler {
   }
 
   struct Side {
-    uint32_t first = kNone;  // the set of a component at the face; kNone: none
+    uint32_t first = kNone;  // set of the first component at the face; kNone: no component is there
     bool is_one = true;      // all components at the face are in this set
     bool is_open = false;    // all voxels at the face are empty
   };

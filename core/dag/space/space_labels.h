@@ -1,6 +1,6 @@
-// Labels for the empty space of a sub-DAG: the 6-connected components of the empty voxels in the
-// cube of each node, as far as they have a voxel at a face of that cube. All other components are
-// *closed*: no walk leads out of them, whatever is around the cube.
+// Labels the empty space of a sub-DAG. In the cube of each node, it labels the 6-connected
+// components of empty voxels that have a voxel at a face of the cube. All other components are
+// *closed*: no walk through empty voxels leads out of them, whatever is around the cube.
 //
 // Components belong to a node and not to its places in the octree. So the cost depends on the
 // number of unique nodes. The components of a node follow from the components of its octants, which

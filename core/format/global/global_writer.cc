@@ -292,7 +292,7 @@ void GlobalFileWriter::end_section(const GlobalAttribute& attribute) {
   State& s = *state_;
   const std::string name = s.path + ": the section of attribute " + std::to_string(attribute.kind);
   if (!s.section_open || s.section_bytes == 0)
-    throw Error(ErrorCode::kCorrupt, name + " has no bytes: expected data before its end");
+    throw Error(ErrorCode::kCorrupt, name + " has no bytes: expected at least one byte");
   if (!s.sections.empty() && s.sections.back().attribute.kind >= attribute.kind)
     throw Error(ErrorCode::kCorrupt, name + " follows attribute " +
                                          std::to_string(s.sections.back().attribute.kind) +

@@ -56,7 +56,6 @@ void SpaceReserve::use(const std::string& path, uint64_t bytes) {
                 "cannot write " + path + ": the disk has " + size_text(free_bytes) +
                     " free in addition to the " + size_text(reserve_bytes_) +
                     " that must stay free, expected at least " + size_text(bytes));
-  // If little more than the reserve is free, every write reads the free space again.
   unchecked_bytes_ = free_bytes < 2 * kCheckBytes ? kCheckBytes : 0;
 }
 

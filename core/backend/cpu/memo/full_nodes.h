@@ -1,5 +1,5 @@
-// The nodes of full cubes, in which all voxels are set: one for each size, made when it is first
-// needed. Not thread-safe. Throws OutOfBudget.
+// Makes the nodes of full cubes, which are cubes with all voxels set. There is one node for each
+// size of cube. It is made when it is first needed. Not thread-safe. Throws OutOfBudget.
 #pragma once
 
 #include "core/dag/consing/sub_dag_tables.h"

@@ -13,7 +13,8 @@
 
 namespace voxdag::cpu {
 
-// The plane n.p + c = 0 of lattice positions p. The components of n have no common divisor.
+// The plane n.p + c = 0. Positions p have lattice coordinates, in units of 1/256 voxel
+// (core/geometry/fixed_triangle.h). The components of n have no common divisor.
 //
 // For a cube with low corner q, the offset of the plane is f = floor((n.q + c) / 256). Let k be the
 // position of a voxel corner in the cube, in voxels, so that its lattice position is q + 256 k. The
@@ -23,9 +24,9 @@ namespace voxdag::cpu {
 //     0 <= n.k + f + up <= width.
 //
 // With the rule kThin, this means that the row through the voxel's center along the dominant axis
-// crosses the plane within the voxel (thin_triangle.h). For this rule, set_rule() makes c the value
-// on this row instead of the value at the voxel's corner, and subtracts 1 if ties are below the
-// plane.
+// crosses the plane within the voxel (thin_triangle.h). For this rule, set_rule() changes c so that
+// the formula above gives the value on this row instead of the value at the voxel's corner. It also
+// subtracts 1 from c if points on the plane count as below it.
 struct Plane {
   int64_t n[3];
   int128 c;

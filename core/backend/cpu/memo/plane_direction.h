@@ -3,9 +3,9 @@
 // voxels has 729 corners, so the sorted values -n.k divide all offsets f into at most 730
 // intervals. All planes with offsets in one interval produce the same node. This node is made once
 // and then looked up. The same is true for nodes that also contain the inner sides of the plane
-// (InnerSides), because their voxels have the same bounds. The same intervals are also valid for
-// the rule kThin: whether a voxel k is set changes only at the offsets -n.k and -n.(k + e), where e
-// is the unit vector along the dominant axis.
+// (InnerSides): an inner side only removes one end of the range of n.k (PlaneRange::with()). The
+// same intervals are also valid for the rule kThin: whether a voxel k is set changes only at the
+// offsets -n.k and -n.(k + e), where e is the unit vector along the dominant axis.
 #pragma once
 
 #include <cstdint>

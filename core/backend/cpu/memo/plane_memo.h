@@ -50,7 +50,8 @@ class PlaneMemo {
 
   // Sets `node` to the node of a cube that the triangle `entry` covers and no other triangle
   // touches. If the plane misses the cube, sets node.exists to false. Returns false if the memo
-  // does not contain the plane (yet), or if Plane::fits() is false for cubes of this size.
+  // does not contain the plane (yet), if Plane::fits() is false for cubes of this size, or if the
+  // budget has no memory for the plane's direction.
   bool build(const TriangleSet& triangles, Entry entry, const LatticeCube& cube, int size_log2,
              NodeRef& node);
   // Returns the plane of a triangle that covers a cube; nullopt if build() would return false.
@@ -115,7 +116,8 @@ class PlaneMemo {
   TileReducer& reducer_;
   const Kernels& kernels_;
   const VoxelRule rule_;
-  PooledArray<uint32_t> known_;  // by number of the narrow triangle; see kWorthwhile
+  // Indexed by the number of a narrow triangle (triangle_set.h). The values are defined above.
+  PooledArray<uint32_t> known_;
   PooledArray<KnownPlane> planes_;
   uint32_t plane_count_ = 0;
   std::vector<PooledArray<PlaneDirection>> directions_;

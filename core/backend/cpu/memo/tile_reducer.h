@@ -3,9 +3,9 @@
 // hashed, then their slots and records in the tables are prefetched, and then the tables are
 // searched for all nodes. So the memory latencies of the nodes overlap.
 //
-// The non-empty cubes of a level are a bit set in Morton order. Each byte of this set is the child
-// mask of a node of the next coarser level, and the positions of the nonzero bytes are the bit set
-// of that level. Not thread-safe.
+// The set of the non-empty cubes of a level is stored as bits, in Morton order. Each byte of this
+// set is the child mask of one node of the next coarser level. A bit of the coarser level's set is
+// 1 if this byte is not 0. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -81,8 +81,8 @@ class TileReducer {
   static void look_up(const Parents& parents, NodeTable& table, uint64_t* hashes, uint32_t* ids);
 
   static constexpr int kMaxBricks = kTileBlocks * kBlockBricks;
-  // Max children of a node. NodeTable::find_or_add() may read this many ids, beginning with the id
-  // of a node's first child. So the arrays of ids have this many spare elements at their ends.
+  // Max children of a node. NodeTable::find_or_add() always reads this many ids, beginning with the
+  // id of a node's first child. So the arrays of ids have this many spare elements at their ends.
   static constexpr int kChildren = 8;
 
   SubDagTables& tables_;

@@ -51,8 +51,8 @@ VOXDAG_SLICES_INLINE void exchange_order(Words& words) {
 }
 
 // Extends `reached` in both directions along lines of eight voxels, whose bits are kStep apart.
-// `empty_above` has the empty voxels that a step to a higher bit may enter, `empty_below` the empty
-// voxels that a step to a lower bit may enter.
+// `empty_above` has the empty voxels that a step to a higher bit can enter. `empty_below` has the
+// empty voxels that a step to a lower bit can enter.
 template <int kStep>
 VOXDAG_SLICES_INLINE void fill_lines(Words& reached, const Words& empty_above,
                                      const Words& empty_below) {

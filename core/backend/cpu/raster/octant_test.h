@@ -7,8 +7,8 @@
 // child as inside (see Entry in triangle_set.h) although the triangle does not cover it. So bounds
 // for touched children are widened, and bounds for inside children narrowed, by more than the
 // rounding error. Vertices and edges are exact in doubles (below 2^42). Normals are computed in
-// integers and rounded once. All other values are sums of at most eight products, each with an
-// error of at most 3 * 2^-53 of |coefficient| * |distance|.
+// integers and rounded once. All other values are sums of at most eight products. A product of a
+// coefficient and a distance has an error of at most 3 * 2^-53 |coefficient| |distance|.
 //
 // Quad is a vector of four doubles with arithmetic operators. load(coordinates, origin) returns the
 // coordinates relative to the origin. The other functions of a Quad are

@@ -20,9 +20,9 @@ struct Slices {
   }
 };
 
-// The 6-connected components of a block's empty voxels that contain a corner of the block. Several
-// components may be in one entry if all their corners have the same class, because they are then
-// all inside the solid or all outside.
+// The 6-connected components of a block's empty voxels that contain a corner of the block. One
+// entry can have several components. All their corners then have the same class
+// (TileViews::classes_at()), so these components are all inside the solid or all outside.
 struct BlockComponents {
   int count;
   uint32_t corners[8];  // bit sets, by child index

@@ -13,14 +13,21 @@
 // lowest eight bits of a coordinate, its position within a voxel, because for an integer i and any
 // x, 256 i + x >= 0 <=> i + floor(x / 256) >= 0.
 //
-// Bounds for narrow triangles: half-edges are <= 2^27, so |n_a| <= 2^54 (the triangle's projection
-// is in its box), and the sum of |n_a| is <= 3 * 2^54. If the plane misses the tile, there is
-// nothing to draw. Otherwise |n.k + lowest| <= 64 * 3 * 2^54 < 2^62 at every corner of a voxel. For
-// edges, |a|, |b| <= 2^27 and |c| < 2^50.
+// Bounds for narrow triangles (triangle_set.h): the extent along every axis is at most 2^28, so
+// half-edges are <= 2^27. A projected triangle covers at most half of its bounding rectangle. So
+// each component of the cross product of two complete edges is <= 2^56, and the quarter normal has
+// |n_a| <= 2^54. The sum of |n_a| is <= 3 * 2^54. If the plane misses the tile, there is nothing to
+// draw. Otherwise n.k + lowest reaches the range from 0 to width in the tile of 64^3 voxels, where
+// width <= 3 * 2^54. So |n.k + lowest| <= 64 * 3 * 2^54 < 2^62 at every corner of a voxel. For
+// edges, |a|, |b| <= 2^27. The triangle's box touches the tile, so |v| < 2^29. c is the constant
+// part of the edge function, which is below 2^57, divided by 256, plus at most |a| + |b|. So
+// |c| < 2^50.
 //
-// Bounds for wide triangles: half-edges are < 2^40, so |n_a| < 2^81, and n.v < 2^124 in 128 bits.
-// Edge constants c are below 2^82. set_up() clamps them to +-2^60. Clamping does not change the
-// sign of a k_p + b k_q + c, because |a k_p + b k_q| < 2^47.
+// Bounds for wide triangles (triangle_set.h): coordinates are below 2^40. So |v| < 2^41 relative to
+// the tile, half-edges are < 2^40, |n_a| < 2^81, and |n.v| < 3 * 2^122 fits in 128 bits. The
+// constant part of an edge function is below 2^82. set_up() divides it by 256, and clamps the
+// result to +-2^60, because c has only 64 bits. A clamped constant still decides the sign of
+// a k_p + b k_q + c, because all other terms together are at most 64 (|a| + |b|) < 2^47.
 #pragma once
 
 #include <cstdint>

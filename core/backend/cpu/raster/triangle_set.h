@@ -11,8 +11,8 @@
 namespace voxdag::cpu {
 
 // A triangle in lattice coordinates, v[axis][vertex]. Axis 0 is x. Bit 2 - a of a child index
-// belongs to axis a (child_coordinate()), as do bits 2 - a and 5 - a of a brick's bit number
-// (brick_coordinate()).
+// belongs to axis a (child_coordinate()). Bits 2 - a and 5 - a of a voxel's bit number in its brick
+// also belong to axis a (brick_coordinate()).
 template <class Int>
 struct Triangle {
   Int v[3][3];

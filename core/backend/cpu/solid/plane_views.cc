@@ -47,8 +47,8 @@ std::optional<PlaneViews::Sides> PlaneViews::read(const Plane& plane, int64_t f,
   int32_t sums[2] = {0, 0};
   for (const auto& views : views_)
     for (int side = 0; side < 2; ++side) sums[side] += views[side];
-  // A side of the plane without a corner counts as outside: all its voxels are in the shell, so
-  // there is nothing to fill.
+  // If no corner of a block is on a side of the plane, this side counts as outside. All its voxels
+  // are in the shell, so there is nothing to fill.
   const InnerSides inner{lowest < 0 && is_inside(sums[0]), highest >= 0 && is_inside(sums[1])};
   const bool below = inner.below && is_disputed(sums[0]);
   const bool above = inner.above && is_disputed(sums[1]);

@@ -1,7 +1,7 @@
-// The views (core/geometry/solid_rule.h) on both sides of a plane that covers a tile and is the
-// tile's only surface. If all corners of blocks on the same side of the plane have equal views, the
-// plane and its inner sides (plane.h) determine the tile's voxels, so the tile's node can be in the
-// plane memo. Not thread-safe.
+// The views (core/geometry/solid_rule.h) on both sides of a triangle's plane in a tile. The
+// triangle covers the tile (triangle_set.h) and is the only triangle in it. If all corners of
+// blocks on the same side of the plane have equal views, the plane and its inner sides (plane.h)
+// determine the tile's voxels, so the tile's node can be in the plane memo. Not thread-safe.
 #pragma once
 
 #include <cstdint>

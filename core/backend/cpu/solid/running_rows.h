@@ -2,9 +2,9 @@
 //
 // A walk over tiles in octree order reaches a tile after all tiles with a smaller x and the same y
 // and z, and likewise along y and z. So one number per row is enough: the row's view at the low
-// face of the next tile of its column. A column of tiles along an axis has the rows through its
-// square and the square's borders. If two columns share a border, each has its own copy of the
-// border's rows. Not thread-safe.
+// face of the next tile of its column. The cross section of a column of tiles along an axis is a
+// square. The column has the rows through the square and on the square's borders. If two columns
+// share a border, each has its own copy of the border's rows. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,7 @@
 // Decides which empty voxels of a subvolume are inside a solid (core/geometry/solid_rule.h), and
-// fills them, while the subvolume is built. Holds the running rows, and the views and units of the
-// current tile. Used for one build, by one thread. Throws OutOfBudget.
+// fills them, while the subvolume is built. Holds the running views of the subvolume's sample rows
+// (running_rows.h), and the views and units of the current tile. Used for one build, by one thread.
+// Throws OutOfBudget.
 #pragma once
 
 #include <cstdint>
@@ -23,10 +24,11 @@ class SolidFill {
   SolidFill(const SubvolumeTask& task, const Kernels& kernels, PooledMemory& memory,
             SubDagTables& tables, FullNodes& full);
 
-  // For a tile of 64^3 voxels whose only surface is a plane that covers it (PlaneViews): returns
-  // the plane's inner sides; nullopt if the tile needs begin_tile(), add() and fill_tile(). If the
-  // tile's node can be made with these sides, call pass_plane() with the number of filled voxels.
-  // `f` and `is_turned` are as for PlaneViews::read().
+  // For a tile of 64^3 voxels with a single triangle, which covers the tile (plane_views.h):
+  // returns the inner sides of the triangle's plane. Returns nullopt if the tile needs
+  // begin_tile(), add() and fill_tile(). If the tile's node can be made with these sides, call
+  // pass_plane() with the number of filled voxels. `f` and `is_turned` are as for
+  // PlaneViews::read().
   std::optional<PlaneViews::Sides> read_plane(const Plane& plane, int64_t f, bool is_turned,
                                               const LatticeCube& tile);
   void pass_plane(const PlaneViews::Sides& sides, uint64_t filled);

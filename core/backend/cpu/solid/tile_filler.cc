@@ -12,8 +12,9 @@
 namespace voxdag::cpu {
 namespace {
 
-// Max blind components (solid_rule.h) that are collected before one pass over the tile's triangles
-// computes the walks to all of them.
+// Maximum number of blind components (components without a corner, see solid_rule.h) that are
+// collected. One pass over the tile's triangles then counts the crossings of the walks to all of
+// them.
 constexpr size_t kMaxBlind = 256;
 
 // Returns the coordinate, along `axis`, of the cube with the number `index` (below 512) in Morton

@@ -50,7 +50,7 @@ class TileFiller {
     int block;  // index in TileBricks
     Slices voxels;
     int64_t from[3], to[3];
-    int64_t views;      // of the block's low corner
+    int64_t views;      // sum of the views from the block's low corner
     int64_t crossings;  // sum of the signs of the walk's crossings
   };
 

@@ -33,9 +33,9 @@ class BrickList {
   uint64_t* codes() { return codes_.data(); }
   uint64_t* masks() { return masks_.data(); }
 
-  // Makes space for `count` bricks after the last brick, and returns the position of the first of
-  // them; commit() adds the bricks that were written there. If the arrays are full, first merges
-  // duplicate bricks. If this frees too little space, the list grows.
+  // Makes space for `count` bricks after the last brick, and returns the position at which this
+  // space begins. commit() adds the bricks that were written there. If the arrays are full, first
+  // merges duplicate bricks. If this frees too little space, the list grows.
   uint32_t reserve(uint32_t count) {
     if (size_ + uint64_t{count} <= codes_.size()) return size_;
     merge();

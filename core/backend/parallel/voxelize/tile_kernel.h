@@ -43,9 +43,9 @@ struct DrawTile : TileWave {
   static constexpr uint32_t kThreads = 256;
   static constexpr int kMinResidentBlocks = 2;
   static constexpr int kPhases = 5;
-  static constexpr uint32_t kRun = kTileBricks / kThreads;  // bricks of a thread's run
-  static constexpr uint32_t kGroup = 16;                    // threads whose counts one thread adds
-                                                            // up
+  // A thread's run: this many consecutive bricks, which the thread counts and writes.
+  static constexpr uint32_t kRun = kTileBricks / kThreads;
+  static constexpr uint32_t kGroup = 16;  // number of threads whose counts one thread adds up
 
   struct Shared {
     uint64_t masks[kTileBricks + kThreads];  // indexed by slot()

@@ -13,11 +13,13 @@
 // quarter normals, which are cross products of half edges.
 //
 // The bounds are for triangles of less than 2^28 units in each axis ("narrow") and lattices of at
-// most 2^28 units (the largest grid). Half edges are < 2^27, quarter normals n_a < 2^55. If the
-// triangle and the lattice overlap in an axis, |low - v| < 2^29 in this axis, so edge constants are
-// below 2^58. The constants of the plane need 128 bits. A clamped constant keeps its sign in a test
-// as long as its magnitude exceeds the terms that are added: with N = 4, these are below 2^30 for
-// edges (8 half edges) and 12 max |n_a| for the plane. Larger triangles are tested cell by cell.
+// most 2^28 units (the largest grid). Half edges are < 2^27. A component of a quarter normal is the
+// difference of two products of half edges, so |n_a| < 2^55. If the triangle and the lattice
+// overlap in an axis, |low - v| < 2^29 in this axis, so edge constants are below 2^58. The
+// constants of the plane need 128 bits. The constants are clamped to fewer bits. A clamped constant
+// still decides the sign of a test if its magnitude exceeds the sum of the terms that are added to
+// it. With N = 4, this sum is below 2^30 for edges (less than 8 half edges), and at most 12 max
+// |n_a| for the plane. Larger triangles are tested cell by cell.
 #pragma once
 
 #include <cstdint>

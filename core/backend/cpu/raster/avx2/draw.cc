@@ -8,11 +8,12 @@
 namespace voxdag::cpu {
 namespace {
 
-// Tables with an element for each of a brick's 64 voxels, as bytes of two vectors. Bit 5 of the
-// voxel's bit number (core/dag/brick.h) selects the vector, and bit 4 the half of the vector.
+// Tables with an element for each of a brick's 64 voxels, as bytes of two vectors. tile_columns.h
+// defines the number of a voxel column. Bit 5 of the voxel's bit number (core/dag/brick.h) selects
+// the vector, and bit 4 the half of the vector.
 template <int D>
 struct ByteOrder {
-  alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number
+  alignas(32) int8_t column[2][32] = {};     // lower three bits of the column's number
   alignas(32) int8_t height[4][2][32] = {};  // height above the floor of the first of four bricks
   alignas(32) int8_t depth[4][2][32] = {};   // distance below the highest voxel of the four bricks
   constexpr ByteOrder() {

@@ -10,8 +10,9 @@
 //     up = 0:  no voxel if t > 0, otherwise all. The code divides by 2^-60 instead of |up| = 0, so
 //              y is far above or far below all voxels.
 // The code computes y = slope k + start in doubles; only the division, products and sums are
-// rounded. y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. The floor of y is exact
-// where that matters:
+// rounded. |across| and |up| are at most 2^27 (tile_triangle.h). t - 1/2 is half-way between
+// integers, so y is at least 1 / (2 |up|) >= 2^-28 away from a whole number. The floor of y is
+// exact where that matters:
 //     |c| <= 2^36:  The error of y is below 2^-12 / |up| + 2^-45, including the error of adding the
 //                   constructor's below_more or over_more.
 //     |c| > 2^36:   |y| > 2^8 is outside the tile, so only the sign of y matters. The error is
@@ -77,7 +78,7 @@ struct EdgeLanes {
 // nothing.
 //
 // Two bounds per side are enough: the three values of `up` sum to 0, so one or two are negative, or
-// all are 0. An edge with up = 0 may be on either side.
+// all are 0. For an edge with up = 0, both sides give the same result.
 struct BoundOrder {
   alignas(32) int32_t lane[8][8] = {};
   constexpr BoundOrder() {

@@ -7,13 +7,16 @@
 //     y <= z <= y + width / n_D                     with y = -(n.(p, q) + lowest) / n_D
 // These are at most four voxels, since width <= 3 n_D.
 //
+// A column of bricks *begins* in the brick that contains the smallest of the 16 values y of its
+// voxel columns. The voxel column with this value is the *lowest* voxel column.
+//
 // A vector has a 16-bit lane for the y of each voxel column. The unit of a lane is 2^-12 voxel, and
-// y is relative to the floor of the brick in which the column of bricks begins. For the lowest of
-// the 16 voxel columns, y is in 0..4 voxels. For the other voxel columns y is up to 6 voxels more.
-// The upper bound y + width / n_D is up to 3 voxels above y. y is rounded down and the upper bound
-// is rounded up, by little more than 2 units of a lane. A lane can be so close to a whole number of
-// voxels that the exact value may be on the other side of this number. In this case the code
-// computes the height exactly by division. About 2 in 100 columns of bricks have such a lane.
+// y is relative to the floor of the brick in which the column of bricks begins. For the lowest
+// voxel column, y is in 0..4 voxels. For the other voxel columns y is up to 6 voxels more. The
+// upper bound y + width / n_D is up to 3 voxels above y. y is rounded down and the upper bound is
+// rounded up, by little more than 2 units of a lane. If a lane is very close to a whole number of
+// voxels, the exact value can be on the other side of this number. In this case the code computes
+// the height exactly by division. About 2 in 100 columns of bricks have such a lane.
 //
 // Only included by sources compiled for AVX2 or AVX-512; everything has internal linkage.
 #pragma once
@@ -73,8 +76,8 @@ class Heights {
   struct Column {
     int p, q;
     int64_t from, to;  // range of bricks that the plane may touch; empty if from > to
-    int brick;         // brick in which the lowest voxel column begins
-    int within;        // height of that voxel column above the floor of `brick`, in units of a lane
+    int brick;         // brick in which this column of bricks begins (see above)
+    int within;        // y of the lowest voxel column, above the floor of `brick`, in lane units
   };
   // Returns the column of bricks (p, q), limited to the bricks from `first` to `last`.
   VOXDAG_INLINE Column column(int p, int q, int first, int last) const {

@@ -16,11 +16,11 @@ namespace voxdag::cpu {
 namespace {
 
 // Bounds `below` and `over` of the heights in the 16 voxel columns of a column of bricks, one byte
-// each. Heights z are counted from the floor of the brick in which the column of bricks begins. The
-// touched voxels have below < z <= 15 - over. Each half of the vector is for eight voxel columns:
-// first their `below`, then their `over`. A bound of 0 excludes no voxel that the plane touches, so
-// bounds are combined by their maximum. `below` of 15 or more, or `over` of 16 or more, excludes
-// everything.
+// each. Heights z are counted from the floor of the brick in which the column of bricks begins
+// (heights.h). The touched voxels have below < z <= 15 - over. Each half of the vector is for eight
+// voxel columns: first their `below`, then their `over`. A bound of 0 excludes no voxel that the
+// plane touches, so bounds are combined by their maximum. `below` of 15 or more, or `over` of 16 or
+// more, excludes everything.
 using HeightBounds = __m256i;
 constexpr int kMaxHeight = 15;
 
