@@ -1,5 +1,6 @@
 // The merge under small budgets gives the same bytes with several hash partitions, several passes,
-// spilled position maps and streamed groups. The report must show that each of these happened.
+// spilled position maps and streamed groups (MergeReport::streamed_groups). The report must show
+// that each of these happened.
 #include <gtest/gtest.h>
 
 #include "core/dag/node_hash.h"

@@ -97,7 +97,7 @@ TEST_P(MergeResume, ResumesAfterEverySave) {
       ASSERT_EQ(error.code(), ErrorCode::kIo) << error.what();
     }
   }
-  EXPECT_GE(deaths, 7u);  // the levels
+  EXPECT_GE(deaths, 7u);  // at least one for each of the 7 levels
   EXPECT_EQ(checkpoint.forgotten, 0u);
   EXPECT_TRUE(checkpoint.released > 0 || whole.report.passes > 1);
   EXPECT_TRUE(std::ranges::is_sorted(checkpoint.levels, std::greater()));

@@ -1,4 +1,5 @@
-// Positions of one word and of two words: in rows, in position maps, and in the output.
+// Tests positions (merge/load/row.h) of one word and of two words: in rows, in position maps, and
+// in the output.
 #include "merge/load/position_maps.h"
 
 #include <gmock/gmock.h>

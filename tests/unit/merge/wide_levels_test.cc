@@ -60,7 +60,7 @@ TEST_P(WideLevels, HashPartitionsAndSpilledMaps) {
 
 TEST_P(WideLevels, SeveralPasses) { merge(noise_voxels(2, 256), equal_cubes(3), 64, {24, 16}); }
 
-// With 4 hash bits, many rows have equal hashes, which the heap merge (heap_merge.h) merges.
+// With 4 hash bits, many rows have equal hashes. The heap merge (heap_merge.h) merges these rows.
 TEST_P(WideLevels, EqualHashes) { merge(noise_voxels(3, 256), equal_cubes(3), 4, {24, 16}); }
 
 // There is one run, and its position map does not fit in the memory of a worker.

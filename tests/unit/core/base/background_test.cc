@@ -9,7 +9,7 @@
 namespace voxdag {
 namespace {
 
-// The work runs on another thread and may own objects that cannot be copied.
+// The work runs on another thread. It can own objects that cannot be copied.
 TEST(RunInBackground, RunsOnAThreadOfItsOwn) {
   std::thread::id thread;
   std::future<void> done = run_in_background(

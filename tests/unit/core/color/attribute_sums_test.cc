@@ -21,8 +21,9 @@ TEST(AttributeSums, FindTheHeaviestOfManyMaterials) {
   for (int round = 0; round < 2; ++round) {
     for (uint32_t i = 0; i < kAdded; ++i) {
       const auto cell = static_cast<uint32_t>(random() % kCells);
-      // At a random time, reset() discards the contributions to a cell with an odd number, as for a
-      // cell that a triangle covers after others only touched it.
+      // At a random time, reset() discards the contributions to a cell with an odd number. The
+      // baking code calls reset() when a triangle covers a cell that earlier triangles only
+      // touched.
       if (cell % 2 == 1 && !is_covered[cell] && random() % 2000 == 0) {
         sums.reset(cell);
         weights[cell].clear();

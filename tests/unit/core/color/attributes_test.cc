@@ -97,9 +97,9 @@ TEST(ValueOfParent, FollowsTheChildren) {
   EXPECT_EQ(of(Attribute::kNormal, {0u, 0u}), 0u);
 }
 
-// The expected values of a cell. `area` is the sum of the triangles' area vectors; in `turned`,
-// each vector points to the positive side of its dominant axis, so that the two sides of a thin
-// sheet do not cancel out.
+// The expected values of a cell. `area` is the sum of the triangles' area vectors. `turned` is the
+// sum of the same vectors, each turned to the positive side of its dominant axis, so that the two
+// sides of a thin sheet do not cancel out.
 struct ExpectedCell {
   double weight = 0, alpha = 0;
   Vector area{}, turned{};

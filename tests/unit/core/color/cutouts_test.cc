@@ -95,7 +95,8 @@ Voxels visible_voxels(const VisiblePart& part) {
   return all;
 }
 
-// Returns the voxels that the patches touch.
+// Returns the voxels that the patches touch. The patches (visible_patches.h) are triangles that
+// together touch exactly the visible voxels.
 Voxels voxels_of_patches(const VisiblePart& part) {
   static VisiblePatches patches(kLevels);  // reused, as in builds
   Voxels all;

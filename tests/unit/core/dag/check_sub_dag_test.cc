@@ -20,7 +20,7 @@ constexpr uint32_t kCubeLevel = 4;  // 32 voxels: bricks on level 7, nodes on 6,
 
 SubDagShape shape_of(uint32_t hash_bits) { return {kCubeLevel, kGridLevels, hash_bits}; }
 
-// Returns a right sub-DAG. With few hash bits, some of its nodes have equal truncated hashes.
+// Returns a valid sub-DAG. With few hash bits, some of its nodes have equal truncated hashes.
 SubDag right_one(int hash_bits) {
   const oracle::Region region{{0, 0, 0}, 32};
   const auto scene = oracle::make_scene(oracle::SceneKind::kSoup, 3, region, 12);

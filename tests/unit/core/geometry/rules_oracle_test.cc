@@ -1,4 +1,4 @@
-// The oracle for the rules of solids and of thin shells, on meshes whose answers are known.
+// Tests the oracle for the rules of solids and of thin shells, on meshes whose results are known.
 #include <gtest/gtest.h>
 
 #include "tests/oracle/solid/crossing.h"

@@ -47,7 +47,7 @@ TEST(Draw, KernelsEqualOracle) {
 }
 
 // draw_wide() and draw_thin_wide(), which use 128-bit integers, set exactly the oracle's voxels,
-// both for wide triangles and for narrow ones.
+// both for wide and for narrow triangles (triangle_set.h).
 TEST(Draw, WideEqualsOracle) {
   int wide_ones = 0;
   for_many_triangles(40, [&](const oracle::Triangle& t, const oracle::Region& region) {
@@ -60,9 +60,9 @@ TEST(Draw, WideEqualsOracle) {
   EXPECT_GT(wide_ones, 50);
 }
 
-// The kernels round the heights of the triangle's plane, but equal the oracle even if the plane
-// passes through voxel corners or just misses them, where rounding could change the result. The
-// planes' slopes are ratios of small numbers, so that this happens often.
+// The kernels round the heights of the triangle's plane (heights.h). They set the oracle's voxels
+// even if the plane passes through voxel corners or just misses them, where rounding could change
+// the result. The planes' slopes are ratios of small numbers, so that this happens often.
 TEST(Draw, AmbiguousHeightsAreExact) {
   oracle::Random random(2);
   const oracle::Region region{{512, 1024, 4096}, 16};
@@ -86,9 +86,10 @@ TEST(Draw, AmbiguousHeightsAreExact) {
   }
 }
 
-// The kernels compute in doubles how far each edge bounds the triangle in a row. They equal the
-// oracle even if edges pass through voxel corners or just miss them, where rounding could change
-// the result. The edges have every length; some are parallel to an axis.
+// For each row of voxels, the kernels compute in doubles the first and the last voxel inside an
+// edge (edge_bounds.h). They set the oracle's voxels even if edges pass through voxel corners or
+// just miss them, where rounding could change the result. The test has edges of every length, and
+// some edges parallel to an axis.
 TEST(Draw, AmbiguousEdgesAreExact) {
   oracle::Random random(4);
   const int64_t middle = int64_t{1} << 19;
@@ -109,8 +110,8 @@ TEST(Draw, AmbiguousEdgesAreExact) {
   }
 }
 
-// The kernels also equal the oracle for the rule kThin if planes and edges pass through centers of
-// voxels, faces and edges, or just miss them.
+// With the rule kThin, the kernels set the oracle's voxels even if planes and edges of triangles
+// pass through the centers of voxels, of their faces or of their edges, or just miss these centers.
 TEST(Draw, AmbiguousCentersAreExact) {
   oracle::Random random(5);
   const int64_t middle = int64_t{1} << 19;

@@ -73,8 +73,8 @@ oracle::Triangle covering(const oracle::Region& region, const std::array<int64_t
   return t;
 }
 
-// Compares the node of a cube that the memo builds with the node that is drawn. Does the same for
-// three of the cube's children, recursively down to the smallest size of the memo. Returns the
+// Compares the memo's node of a cube with the node that drawn_node() makes. Does the same for three
+// of the cube's children, recursively down to the smallest cubes that the memo accepts. Returns the
 // number of compared cubes.
 int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, const LatticeCube& box,
             int size_log2, TileBricks& tile) {
@@ -120,7 +120,7 @@ void expect_memo_equals_drawing(VoxelRule rule) {
     TriangleSet set(by_memo.memory);
     set.add(axis_major(oracle::fixed(t)));
     // The memo adds a triangle's plane only after build() was called for enough cubes that the
-    // triangle covers, and it may never add the plane.
+    // triangle covers. It refuses some planes, so `found` can remain false.
     NodeRef node;
     bool found = false;
     for (int i = 0; i < 40 && !found; ++i)

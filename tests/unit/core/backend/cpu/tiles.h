@@ -14,8 +14,8 @@
 
 namespace voxdag::cpu {
 
-// A triangle of the oracle in the form that this backend uses: coordinates by axis. A spare element
-// follows, because kernels load four coordinates instead of three.
+// A triangle of the oracle in the form that this backend uses: coordinates by axis. An unused
+// triangle follows it, because kernels load four coordinates instead of three.
 template <class Coordinate>
 struct Padded {
   explicit Padded(const oracle::Triangle& t) {
@@ -44,7 +44,7 @@ inline LatticeCube box_of(const oracle::Region& region) {
   return box;
 }
 
-// Returns an aligned cube of 2^size_log2 voxels per edge in a grid of 2^20.
+// Returns an aligned cube of 2^size_log2 voxels per edge in a grid of 2^20 voxels per edge.
 inline oracle::Region random_region(oracle::Random& random, int size_log2) {
   oracle::Region region;
   region.edge = 1 << size_log2;
@@ -64,8 +64,8 @@ inline oracle::Voxels voxels_of(TileBricks& tile, int edge) {
   return voxels;
 }
 
-// Draws a triangle into an empty tile, and returns the tile's voxels. `Prepared` is the triangle's
-// form for the rule of `draw`.
+// Draws a triangle into an empty tile, and returns the tile's voxels. `Prepared` is the class that
+// prepares the triangle for `draw`: TileTriangle, or ThinTriangle for the rule kThin.
 template <template <class> class Prepared = TileTriangle, class Coordinate, class Draw>
 oracle::Voxels drawn(const Triangle<Coordinate>& triangle, bool inside,
                      const oracle::Region& region, Draw draw) {

@@ -1,5 +1,5 @@
-// Both methods of voxelization, by list and by tiles, give the oracle's bricks. The sizes of
-// batches and of their slices do not affect the result.
+// Both methods of voxelization, by list and by tiles, give the oracle's bricks. Neither the number
+// of triangles that are read together nor the size of the slices (pairs.h) affects the result.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// Compares the results of cube_walk.h with a search of the window of each single voxel.
+// Compares the results of cube_walk.h with a direct search. For each voxel, the direct search reads
+// all voxels of a window (window_grid()).
 #include "core/dag/space/cube_walk.h"
 
 #include <gtest/gtest.h>
@@ -33,8 +34,9 @@ SpaceGrid window_grid(const SpaceGrid& grid, const SpaceCell& low, int step, int
   return out;
 }
 
-// Filters one octant of a grid. Its neighbors are the other octants, as nodes of one DAG or of
-// several.
+// Applies add_blocked() or add_enclosed() to one octant of a grid. The other seven octants are its
+// neighbors. If `is_divided` is true, each octant is the root of a separate DAG. Otherwise all
+// octants are nodes of one DAG of the complete grid.
 class FilteredOctant {
  public:
   FilteredOctant(const SpaceGrid& grid, bool is_divided) : whole_(grid) {

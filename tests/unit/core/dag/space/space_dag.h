@@ -1,4 +1,5 @@
-// Grids of voxels, and their nodes with the components of the empty space.
+// Test data for core/dag/space: grids of voxels, and the DAGs of these grids with labels for the
+// components of their empty space.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -18,7 +19,8 @@ namespace voxdag {
 
 using SpaceCell = std::array<int, 3>;
 
-// Voxels of a box of cells.
+// The voxels of a box: 1 if the voxel is set, otherwise 0. `size` is the number of voxels along
+// each axis.
 struct SpaceGrid {
   explicit SpaceGrid(SpaceCell cells) : size(cells) {
     voxels.resize(static_cast<size_t>(size[0]) * size[1] * size[2]);

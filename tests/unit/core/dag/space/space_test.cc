@@ -1,4 +1,4 @@
-// The components of empty space, and the fill of enclosed space, compared with a flood of the
+// Compares the components of empty space, and the fill of enclosed space, with a flood fill of
 // single voxels.
 #include <gtest/gtest.h>
 
@@ -160,7 +160,8 @@ void expect_joined(const SpaceGrid& grid, int axis, int edge) {
     for (uint32_t& s : set)
       if (s == from) s = to;
   });
-  std::vector<uint32_t> sets(grid.voxels.size());  // by voxel: its set + 1; 0 for others
+  // For each voxel of a component: the number of the component's set, plus 1. 0 for other voxels.
+  std::vector<uint32_t> sets(grid.voxels.size());
   SpaceGrid walked(grid.size);
   for (int p = 0; p < 2; ++p)
     for (uint32_t c = 0; c < parts[p].components(); ++c) {

@@ -65,8 +65,8 @@ TEST_F(ArtifactCopyTest, EntriesOfOtherKeysAreRefused) {
             ErrorCode::kCorrupt);
 }
 
-// The entry of a solid also has the counts of its interior. An entry of a shell is not read as one
-// of a solid.
+// The entry of a solid also has the counts of its interior. An entry of a shell is refused if an
+// entry of a solid is requested.
 TEST_F(ArtifactCopyTest, EntriesOfSolidsHaveTheirCounts) {
   const CacheEntry shell = read_cache_entry(system_files(), entry_path_, kKey);
   EXPECT_EQ(error_of([&] { read_cache_entry(system_files(), entry_path_, kKey, true); }).code(),

@@ -63,8 +63,8 @@ TEST_F(ArtifactTest, FramesOfAllSizesComeBack) {
   }
 }
 
-// Child indices of four bytes need a level of over 2^24 rows. Here the level has bricks that differ
-// only in a counter.
+// Child indices of four bytes need a level of over 2^24 rows. In this test, it is the level of the
+// bricks.
 TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   const uint64_t count = (uint64_t{1} << 24) + 10;
   MemoryBudget budget(uint64_t{1} << 30);

@@ -76,8 +76,8 @@ class ColorSectionTest : public testing::Test {
 };
 
 TEST_F(ColorSectionTest, HasTheColorsOfAllLevels) {
-  // {levels of the grid, levels of the color grid}: grids from one brick to three tiers, and color
-  // grids as fine as the grid or coarser.
+  // {levels of the grid, levels of the color grid}: grids from one brick to three tiers of colors
+  // (docs/format.md), and color grids as fine as the grid or coarser.
   const uint32_t sizes[][2] = {{2, 2},   {3, 2},   {4, 4},   {5, 3},   {6, 6},   {7, 5},
                                {7, 6},   {7, 7},   {8, 7},   {9, 8},   {10, 10}, {12, 11},
                                {13, 12}, {14, 13}, {15, 14}, {17, 12}, {20, 20}};
@@ -298,7 +298,7 @@ TEST_F(ColorSectionTest, DamageIsAnError) {
 }
 
 // A solid grid of 2^20 voxels per edge has one node per level and 8^14 color regions. This file has
-// only one region; the reader must find that before it counts all regions.
+// only one region. The reader must detect this before it counts all regions.
 TEST_F(ColorSectionTest, MissingRegionsAreNotCounted) {
   constexpr uint32_t kLevels = 20;
   GlobalFileWriter writer(system_files(), path_, Grid::given({0, 0, 0}, 1, kLevels), 64);

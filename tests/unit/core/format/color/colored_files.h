@@ -73,7 +73,8 @@ inline SumOf smooth_colors(uint32_t color_levels, int noise) {
   };
 }
 
-// Returns spheres, lines and scattered voxels in a grid of any size.
+// Returns at least `count` voxels in a grid of any size: the voxels of random walks, each of at
+// most 200 steps.
 inline Codes random_codes(uint64_t seed, uint32_t levels, int count) {
   oracle::Random random(seed);
   std::set<uint64_t> codes;
@@ -138,7 +139,7 @@ inline oracle::Dag sparse_dag(const Codes& voxels, uint32_t levels) {
   return dag;
 }
 
-// Returns the encoded regions of tier 0, in Morton order.
+// Returns the encoded regions of tier 0 (docs/format.md), in Morton order.
 inline std::vector<EncodedRegion> encode_regions(const ColoredScene& scene) {
   const uint32_t levels = std::min(scene.color_levels, kRegionLevels);
   std::map<uint64_t, std::vector<ColoredCell>> cells;

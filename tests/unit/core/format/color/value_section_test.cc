@@ -1,6 +1,7 @@
 // Tests the sections of alpha, normals and materials. In every cell of every level, the reader's
-// value equals the value of a decoder written from docs/format.md. In finest cells it is the
-// original value; in coarser cells it follows from the children by the rule.
+// value equals the value of a decoder written from docs/format.md. In the finest cells, this is the
+// original value. In coarser cells, it follows from the children's values by the attribute's rule
+// (docs/color.md).
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -201,8 +202,8 @@ TEST_F(ValueSectionTest, DamageIsAnError) {
     } catch (const voxdag_reader::Error&) {
     }
   }
-  // `verify` may accept changes in bytes of finest cells (1, 2 and 1 bytes per cell) and in the 6
-  // bytes of names.
+  // `verify` can accept changes in the bytes of the finest cells (alpha has 1 byte per cell, the
+  // normal 2 and the material 1) and in the 6 bytes of names.
   EXPECT_LE(accepted, (4 * finest + 6) / 3 + 3);
   EXPECT_GT(found, 100u);
 }
