@@ -23,7 +23,7 @@ struct BuildCommand {
   bool json = false;
 };
 
-constexpr const char* kEnclosedRule = "enclosed";  // needs no sample rows
+constexpr const char* kEnclosedRule = "enclosed";  // the rule without sample rows
 
 void print(const BuildReport& r) {
   std::printf("%s: %s, sha256 %s\n", printable_line(r.output).c_str(), size_text(r.bytes).c_str(),

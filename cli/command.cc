@@ -218,7 +218,7 @@ CommandLine::~CommandLine() = default;
 
 Command CommandLine::add(const char* name, const char* description) {
   CLI::App* const command = app_->add_subcommand(name, description);
-  command->footer("");  // a command inherits the footer, which is only for the list of commands
+  command->footer("");  // the inherited footer is only for the list of commands
   return Command(command);
 }
 

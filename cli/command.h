@@ -34,8 +34,8 @@ std::array<Number, kCount> parse_list(const std::string& option, const std::stri
   return *numbers;
 }
 
-// Returns "" if `path` can be the name of a file. For "-", which other programs take for the
-// standard output, returns a text that describes the problem.
+// If `path` is "-", which means the standard output in other programs, returns a text that
+// describes the problem. Returns "" for any other path.
 std::string path_problem(const std::string& path);
 
 // A handle of a command's option. Each member function returns the handle, so calls can be chained.

@@ -11,8 +11,8 @@ namespace voxdag::cli {
 
 class OptionDeclarer {
  public:
-  // Declares only fields whose scope is `scope` or an earlier one. A field's scope is the first
-  // command that has the field as an option, in the order submit, plan, build.
+  // Declares only fields whose scope is not after `scope`. A field's scope is the first of the
+  // commands submit, plan and build (in this order) that has the field as an option.
   OptionDeclarer(Command& command, Scope scope) : command_(command), scope_(scope) {}
 
   // Leaves out the field of this name, which the command declares itself.

@@ -43,9 +43,9 @@ struct OutputFile {
   // Call it before check().
   void guard(GuardedOutputs& files) const;
   // Throws Error{kInvalidInput} if writing would destroy `input`. Unless --force is given, also
-  // throws it if writing would destroy a file for which `is_own` returns false. Makes the same
-  // checks for path + ".partial", the temporary name of write_file_atomically(). Also throws Error
-  // if the output's folder does not exist.
+  // throws this error if writing would destroy a file for which `is_own` returns false. Makes the
+  // same checks for path + ".partial", the temporary name of write_file_atomically(). Also throws
+  // Error if the output's folder does not exist.
   void check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const;
   // Checks one name, such as path + ".partial", in the same way as check() above, but does not
   // check the folder.

@@ -37,7 +37,7 @@ uint32_t grid_levels(const SelectionOptions& options, const voxdag_reader::File&
 query::Region world_region(const std::string& text, const voxdag_reader::File& file,
                            uint32_t grid_levels) {
   const auto box = parse_list<double, 6>("--region", text, ',', "six numbers X0,Y0,Z0,X1,Y1,Z1");
-  // Also refuses NaN.
+  // Also refuses NaN, for which the comparison is false.
   for (size_t axis = 0; axis < 3; ++axis)
     if (!(box[axis] < box[axis + 3])) refuse_order(text);
   return query::cut_to_grid(query::world_to_region(file, grid_levels, box), grid_levels);

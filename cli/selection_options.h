@@ -17,9 +17,8 @@ struct SelectionOptions {
   std::optional<uint64_t> level, resolution;  // at most one of the two
 
   void declare(Command& command);
-  // Returns the selected cells of `file`. The grid may not be finer than the file's grid or coarser
-  // than 4 cells per edge, and the region must contain a cell. Otherwise throws
-  // Error{kInvalidInput}.
+  // Returns the selected cells of `file`. Throws Error{kInvalidInput} if the selected grid is finer
+  // than the file's grid or has fewer than 4 cells per edge, or if the region contains no cell.
   query::Selection selection(const voxdag_reader::File& file) const;
 };
 

@@ -44,7 +44,7 @@ void print(const JobStatus& status, FileSystem& files, const std::string& work_f
 
 void run(const StatusCommand& command, CommandContext& context) {
   for (bool first = true;; first = false) {
-    // The build may finish between two reads of its state. A finished build removes its work
+    // The build can finish between two reads of its state. A finished build removes its work
     // folder.
     if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);

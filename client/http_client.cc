@@ -172,8 +172,8 @@ void throw_if_problem(const ClientResponse& response) {
   std::string code,
       detail = "the server answered with status " + std::to_string(response.status) +
                " and no description of the error, expected one as a voxdag service sends it";
-  // Returns the member `name` if it is a string, otherwise `otherwise`. The answer may come from
-  // another server or a proxy, so its JSON may have any form.
+  // Returns the member `name`, or the argument `otherwise` if this member is not a string. The
+  // answer can come from another server or a proxy, so its JSON can have any form.
   const auto text = [&](const char* name, const std::string& otherwise) {
     const auto found = json.find(name);
     return found != json.end() && found->is_string() ? found->get<std::string>() : otherwise;

@@ -77,7 +77,8 @@ class Download {
     const auto sink = [&](std::string_view bytes) {
       service_.cancel().check();
       if (bytes.size() > size_ - offset)
-        throw_corrupt("expected " + std::to_string(size_) + " bytes");
+        throw_corrupt("more than " + std::to_string(size_) + " bytes arrived, expected " +
+                      std::to_string(size_));
       guard_file([&] { file->write_at(offset, std::as_bytes(std::span(bytes))); });
       offset += bytes.size();
       progress_.advance(bytes.size());
@@ -93,8 +94,8 @@ class Download {
   }
 
   // Runs `step`, which accesses the local file. If `step` throws, file_failed_ remains true, and
-  // the download is not retried. This flag is necessary because an error of the connection, after
-  // which a retry may succeed, is also Error{kIo}.
+  // the download is not retried. The flag is necessary because errors of the connection are also
+  // Error{kIo}, but a retry can succeed after them.
   template <class Step>
   void guard_file(const Step& step) {
     file_failed_ = true;

@@ -91,7 +91,7 @@ class Upload {
 
   // Sends the missing bytes in parts, one request each, so that a crash of the server loses at most
   // one part. The first part is small, because a server that rejects the scene can answer after a
-  // small part, but closes the connection during a large one. If no bytes are missing, sends an
+  // small part, but closes the connection during a large part. If no bytes are missing, sends an
   // empty part, which finishes the upload. Returns true if the upload is complete. Otherwise
   // failure_ has the reason, and the caller tries again.
   bool send_rest() {

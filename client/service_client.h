@@ -19,7 +19,7 @@ class ServiceClient {
   ServiceClient(const ClientOptions& options, const CancelToken& cancel)
       : url_(options.url), cancel_(cancel), http_(options) {}
 
-  // Sends a request that may safely be sent twice. Repeats the request while the server is busy
+  // Sends a request that can safely be sent twice. Repeats the request while the server is busy
   // (status 408, 429, 502 to 504), as long as RetryPolicy (retry_policy.h) allows. If an earlier
   // request of this client was answered, also repeats the request while the server cannot be
   // reached. Throws an Error for any other status of 400 or above.

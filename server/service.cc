@@ -55,7 +55,7 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
 }
 
 // Returns the path of a request for the log. Percent-encodes all bytes except visible ASCII
-// characters, so that a path cannot contain control codes of a terminal.
+// characters, so that a path cannot write control codes of a terminal to the log.
 std::string shown(const std::string& path) {
   std::string text;
   for (const char c : path.substr(0, kMaxLoggedChars)) {

@@ -125,7 +125,7 @@ class Edit {
 
 void run(const EditCommand& command, CommandContext& context) {
   if (command.cuts.empty() && command.scenes.empty() && command.parts.empty())
-    throw Error(ErrorCode::kInvalidInput, "expected --cut, --add or --paste");
+    throw Error(ErrorCode::kInvalidInput, "no edit was given: expected --cut, --add or --paste");
   query::LockedOutputs outputs(context.files, {{command.output}, {command.input}, command.force});
   const RunTimer timer;
   const query::CombineReport report = Edit(command, context, outputs.files()).run();

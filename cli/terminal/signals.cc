@@ -61,8 +61,8 @@ void catch_signals(CancelToken& cancel) {
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // SIGHUP means that the terminal was closed. It remains ignored if nohup has set it to be
-  // ignored.
+  // SIGHUP means that the terminal was closed. If nohup has started the program, SIGHUP is already
+  // ignored. Then it remains ignored.
   struct sigaction hangup {};
   sigaction(SIGHUP, nullptr, &hangup);
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);

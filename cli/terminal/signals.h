@@ -1,11 +1,11 @@
 // Signals that stop a command: SIGINT (Ctrl-C), SIGTERM and SIGHUP.
 //
-// The first signal cancels the command's token. Code that runs for long checks the token, so the
-// command usually ends within milliseconds. Some code cannot check the token, for example a library
-// that decodes an image, and system calls that wait for a disk. If the command has not ended
-// kMaxStopS after the signal, a thread ends the process. This is as safe as a kill: builds resume,
-// and no output has its final name before it is complete. Unlike a kill, the thread removes
-// temporary files. A second signal ends the process immediately.
+// The first signal cancels the command's token. Long-running code checks the token, so the command
+// usually ends within milliseconds. Some code cannot check the token, for example a library that
+// decodes an image, and system calls that wait for a disk. If the command has not ended kMaxStopS
+// after the signal, a thread ends the process. This is as safe as a kill: builds resume, and no
+// output has its final name before it is complete. Unlike a kill, the thread removes temporary
+// files. A second signal ends the process immediately.
 #pragma once
 
 #include "voxdag/cancel_token.h"

@@ -28,11 +28,13 @@ GENERATED = (
 )
 # Base classes whose members are documented with the class that inherits them.
 MEMBERS_OF = {"Dag": ["DagFile"]}
-_TABLE = "[cli.md](../cli.md#options-of-build-and-plan), with `_` in place of `-`"
+_TABLE = "[cli.md](../cli.md#options-of-build-and-plan)"
 OPTIONS_TEXT = {
-    "BuildOptions": f"`options` are the geometry and run options in {_TABLE}.",
-    "VoxelOptions": f"`options` are the run options in {_TABLE}, and `hash_bits`, `attributes` and "
-    "`color_resolution`.",
+    "BuildOptions": f"`options` are the geometry and run options in {_TABLE}, with `_` in place of "
+    "`-`.",
+    "VoxelOptions": f"`options` are two kinds of options in {_TABLE}: the run options except "
+    "`allow_empty`, and the geometry options `hash_bits`, `order`, `attributes` and "
+    "`color_resolution`. The names have `_` in place of `-`.",
 }
 # The parameter of a function for keyword options, such as **options: Unpack[BuildOptions].
 OPTIONS = re.compile(r"\*\*(\w+): Unpack\[(\w+)\]")

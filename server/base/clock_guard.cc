@@ -5,8 +5,12 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxStepS = 3600;              // a larger lead over the elapsed time is a jump
-constexpr double kMaxPauseS = kSecondsPerDay;   // a longer pause between two runs is a jump
+// The clock has jumped if, between two calls, it advances by over kMaxStepS more than the elapsed
+// time.
+constexpr double kMaxStepS = 3600;
+// The clock has jumped if it is over kMaxPauseS ahead of the end of the previous run of the
+// service.
+constexpr double kMaxPauseS = kSecondsPerDay;
 constexpr double kUncertainS = kSecondsPerDay;  // time after a jump in which nothing is deleted
 
 }  // namespace

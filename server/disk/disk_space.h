@@ -28,8 +28,8 @@ class DiskSpace {
    public:
     // `announced`: the expected size of the upload in bytes, 0 if unknown. Throws Error{kNoSpace}
     // unless this much space is free in addition to the space that is kept free or already
-    // reserved. Reserves at most 8 MiB of this space. Other uploads may take the rest before this
-    // upload reserves it.
+    // reserved. At first reserves at most 8 MiB of this space. Other uploads can take the remaining
+    // space before this upload reserves it.
     Reservation(DiskSpace& disk, uint64_t announced);
     ~Reservation();
     Reservation(const Reservation&) = delete;

@@ -7,10 +7,10 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxLineBytes = 4096;
-// For each chunk with content, this number of bytes of the chunk's size line is not counted against
-// kMaxExtraBytes. This number is enough for the longest size in hex. These bytes need no limit,
-// because at least one byte of content follows the line. All other bytes outside the content count:
-// extensions, the line of the last chunk, and trailers with their line ends.
+// kMaxExtraBytes limits the bytes of a body outside its content: extensions of chunks, the size
+// line of the last chunk, and trailers with their line ends. In the size line of a chunk with
+// content, the first kMaxSizeDigits bytes are not counted. They are enough for the longest size in
+// hex, and need no limit, because at least one byte of content follows the line.
 constexpr size_t kMaxSizeDigits = 16;
 constexpr size_t kMaxExtraBytes = 16384;
 constexpr size_t kLineEndBytes = 2;

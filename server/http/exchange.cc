@@ -146,8 +146,8 @@ bool Exchange::send(const Response& response, const std::string& head) {
 }
 
 bool Exchange::send_pieces(const Response& response) {
-  // Allows a large buffer in the kernel for this answer. That is safe because a permit exists only
-  // if the API limits each client's concurrent answers of this kind.
+  // Answers with a permit may use a large buffer in the kernel, because the number of permits
+  // limits the concurrent answers of each client.
   if (response.permit) connection_.allow_large_send_buffer();
   std::string buffer;
   for (const FilePiece& piece : response.pieces) {

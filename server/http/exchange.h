@@ -18,8 +18,8 @@ class Exchange {
   // Reads the head of the request. Request::read_body reads the body. Throws Problem if the head is
   // malformed, too large or too slow, or has a Content-Encoding.
   Request& read_request(size_t max_header_bytes);
-  // Sends the answer. `last`: no other request may follow. Returns true if another request may
-  // follow on the connection.
+  // Sends the answer. `last` is true if the server accepts no further request on the connection.
+  // Returns true if another request can follow on the connection.
   bool answer(Response response, bool last);
 
  private:

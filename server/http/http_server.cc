@@ -125,7 +125,8 @@ class HttpServer::Engine {
   std::optional<TlsContext> tls_;
   ConnectionTable table_;
   std::atomic<bool> draining_{false};
-  // Must be the last member, because its threads use the other members.
+  // Must be the last member, so that its threads end before the destructors of the other members
+  // run.
   std::unique_ptr<ThreadPool> threads_ = std::make_unique<ThreadPool>();
 };
 

@@ -61,7 +61,7 @@ void JobFolders::clean_up() {
       // A suspended or failed job may still have cluster tasks that run: the service may have been
       // killed before it stopped them.
       else if (job->state == JobState::kSuspended || job->state == JobState::kFailed)
-        // `true` skips the merge job, because no job of the service has one.
+        // `true`: does not stop a merge job of Slurm, because the service never submits one.
         stop_cluster_tasks(files_, of(entry.name).work(), true);
       else if (has_ended(job->state) && job->state != JobState::kFailed)
         remove_work(entry.name);

@@ -60,8 +60,8 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;
   if (job.state == JobState::kCanceling) return finish(job, JobState::kCanceled, now_s);
-  // If the job is not running, a client has suspended it, and perhaps resumed it since. Then its
-  // state is kept.
+  // A state other than running means that a client has suspended the job, and has perhaps resumed
+  // it since. Such a state is kept.
   if (job.state != JobState::kRunning) return;
   if (stopped || error.code == "canceled") {
     job.state = JobState::kQueued;

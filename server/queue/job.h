@@ -48,7 +48,7 @@ enum class Preview { kNone = 0, kReady = 1, kFailed = 2 };
 
 struct Job {
   std::string id;
-  int64_t number = 0;  // in the order of submission
+  int64_t number = 0;  // jobs are numbered in the order of their submission
   std::string name;
   JobState state = JobState::kQueued;
   std::string request;              // JSON: scene, resolution, options

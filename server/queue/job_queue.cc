@@ -385,9 +385,9 @@ void JobQueue::remove(const std::string& id) {
 
 std::optional<Job> JobQueue::next(double now_s, double max_wait_s,
                                   const std::set<std::string>& except) {
-  // Reads one job more than `except` contains, so at least one of these jobs is not in `except`.
-  // There are few: `except` contains only jobs that have a process or whose files are being
-  // removed.
+  // Reads one job more than `except` contains. So if the query finds this many jobs, at least one
+  // of them is not in `except`. Few jobs are read, because `except` contains only jobs that have a
+  // process or whose files are being removed.
   const auto jobs =
       query("WHERE " + states_in({JobState::kQueued}) +
                 " AND (not_before_s <= " + std::to_string(now_s) + " OR not_before_s > " +

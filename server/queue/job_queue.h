@@ -96,7 +96,7 @@ class JobQueue {
   // the jobs of one client never make other clients' jobs expire.
   std::vector<std::string> expired(double finished_before_s, uint64_t max_count);
 
-  // Time of the last recorded change of a state; 0 for never.
+  // Returns the Unix time of the last recorded change of a job's state; 0 if there is none.
   double last_event_s();
   // Returns the last events (at most 256) with numbers above `number` of a job, oldest first.
   std::vector<JobEvent> events_after(const std::string& id, int64_t number);

@@ -18,9 +18,9 @@ namespace voxdag::server {
 class SceneUpload {
  public:
   // `first`: offset of this part (0 starts over). `total`: size of the complete upload, if known.
-  // Throws RequestError{kConflict} if another request is writing or, with upload_offset, if the
-  // part does not begin where the last one ended. Throws RequestError{kInvalid} if the total
-  // differs from the first part's total.
+  // Throws RequestError{kConflict} if another request is writing to the scene. Also throws it, with
+  // the member upload_offset, if the part does not begin where the previous part ended. Throws
+  // RequestError{kInvalid} if the total differs from the first part's total.
   SceneUpload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total);
   ~SceneUpload();
   SceneUpload(const SceneUpload&) = delete;
@@ -39,7 +39,8 @@ class SceneUpload {
   bool finish(
       const std::string& part_digest, const std::string& whole_digest, bool is_last,
       const std::function<void()>& check = [] {});
-  // Makes the scene complete and replaces an earlier one. Returns its SHA-256.
+  // Makes the scene complete. Replaces an earlier scene with this name. Returns the SHA-256 of the
+  // new scene.
   std::string publish();
 
  private:

@@ -105,7 +105,7 @@ class Bundle {
   }
 
   const std::function<std::string(const std::string&)>& source_of_;
-  std::map<std::string, std::string> names_;  // results of add(), by path; "" until it returns
+  std::map<std::string, std::string> names_;  // results of add(), by path; "" during the call
   std::string text_;
   int count_ = 0;
 };

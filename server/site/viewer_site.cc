@@ -35,8 +35,8 @@ std::string escaped(const std::string& text) {
   return result;
 }
 
-// True if the page of a package does not contain this line of viewer.html, because the line refers
-// to other files or pages of the service, or has the title of the service's page.
+// True if a line of viewer.html must be left out of the page of a package. Such a line refers to
+// other files or pages of the service, or has the title of the service's page.
 bool is_of_service(const std::string& line) {
   constexpr const char* kParts[] = {"<link ", "<script ", "<title>", "id=\"home\"",
                                     "<!-- Loads the modules"};

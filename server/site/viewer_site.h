@@ -18,7 +18,7 @@ struct PageContents {
 };
 
 // Returns the files of the viewer: index.html, the module with its JavaScript, and the poster. The
-// page shows the package in its own folder.
+// page shows the package that is in the same folder as the page.
 std::vector<query::ViewerFile> viewer_site(const PageContents& contents);
 
 // Returns a page that contains the module of the viewer and the poster, for `publish

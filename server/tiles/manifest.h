@@ -25,7 +25,7 @@ nlohmann::ordered_json manifest_of(const query::DagView& dag, const std::string&
                                    const GridPlace& place, std::optional<uint64_t> root);
 
 // Aspect ratios (width / height) of the pictures for which a manifest has the cameras of named
-// views. For a picture with another aspect ratio, a viewer computes the camera from both.
+// views. For a picture with another aspect ratio, a viewer computes the camera from both cameras.
 inline constexpr double kWideAspect = 16.0 / 9, kTallAspect = 1.0 / 2;
 
 // Returns the camera of the named view of a DAG, which must not be empty. Throws the errors of

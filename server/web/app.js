@@ -71,8 +71,7 @@ async function showMachine() {
   const place = document.getElementById("version");
   const {version} = await getJson("/version");
   setText(place, `voxdag ${version}`);
-  // Uses fetch() and ignores errors: getJson() would open the login page if the service answers
-  // 401, because the user has no token.
+  // Uses fetch() and ignores errors. getJson() would open the login page if the user has no token.
   const response = await fetch("/api/v1/machine", {headers: authorization()});
   if (!response.ok) return;
   const machine = await response.json();

@@ -91,7 +91,8 @@ TEST_F(Edit, Spheres) {
 }
 
 TEST_F(Edit, RefusesBadArguments) {
-  expect_error(2, "expected --cut, --add or --paste", {"edit", "a.vdag", "-o", "x.vdag"});
+  expect_error(2, "no edit was given: expected --cut, --add or --paste",
+               {"edit", "a.vdag", "-o", "x.vdag"});
   expect_error(2, "shape 'cone:1'", {"edit", "a.vdag", "--cut", "cone:1", "-o", "x.vdag"});
   expect_error(2, "PART.vdag@X,Y,Z", {"edit", "a.vdag", "--paste", "a.vdag", "-o", "x.vdag"});
   expect_error(3, "none.glb", {"edit", "a.vdag", "--add", "none.glb", "-o", "x.vdag"});

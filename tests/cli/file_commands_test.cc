@@ -62,8 +62,7 @@ TEST_F(FileCommands, VerifyAgainstAnotherScene) {
 }
 
 // verify --against computes the colors of some regions again from the scene. They equal the file's
-// colors if the scene is the one from which the file was built. With another scene the command
-// fails.
+// colors if the file was built from this scene. With another scene, the command fails.
 TEST_F(FileCommands, VerifyComparesColors) {
   for (const char* colors : {"--colors", "--json"}) {
     const std::string name = colors == std::string("--json") ? "plain.glb" : "city.glb";

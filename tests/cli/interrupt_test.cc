@@ -96,7 +96,7 @@ class InterruptExport : public Interrupt {
   void SetUp() override {
     Interrupt::SetUp();
     ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
-    std::signal(SIGHUP, SIG_DFL);  // whatever runs the tests
+    std::signal(SIGHUP, SIG_DFL);  // the program that runs the tests can ignore SIGHUP
   }
   // Runs the command and sends the signal once the file `first` exists. If the run ends before the
   // signal, tries again, up to ten times. Returns the result of the last run.

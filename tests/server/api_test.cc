@@ -244,7 +244,7 @@ TEST_F(Api, EstimatesAJob) {
 }
 
 // The event stream of a job begins with the job's data and reports every change until the job ends.
-// A request with Last-Event-ID gets the events after this one.
+// A request with the header Last-Event-ID gets the events after the event with this id.
 TEST_F(Api, StreamsEvents) {
   start();
   put_scene("m.glb", scene_bytes());

@@ -5,9 +5,9 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kDepthS = 2;  // a bucket holds the tokens for this many seconds
+constexpr double kDepthS = 2;  // a full bucket has tokens for the requests of this many seconds
 // If more buckets than this number exist, full buckets are dropped. This changes no limit, because
-// a client without a bucket gets a new one, which is also full.
+// a client without a bucket gets a new bucket, which is also full.
 constexpr size_t kMaxBuckets = 10000;
 constexpr double kSweepIntervalS = 1;
 

@@ -37,8 +37,9 @@ struct Context {
   ConcurrencyLimiter uploads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter downloads{config.transfers.max_concurrent, config.transfers.max_per_client};
   ConcurrencyLimiter tiles{config.transfers.max_concurrent, config.transfers.max_per_client};
-  // Limits the answers that are built in memory at the same time. So their memory is bounded even
-  // before the server knows their size and can limit it (ConnectionTable).
+  // Limits the number of answers that are built in memory at the same time. This bounds the memory
+  // of answers whose size is not yet known. Once the size of an answer is known, ConnectionTable
+  // limits its memory.
   ConcurrencyLimiter answers{4, 4};
   ConcurrencyLimiter plans{config.jobs.max_concurrent_plans, config.jobs.max_concurrent_plans};
   OpenTileSources open_sources{files, 16};

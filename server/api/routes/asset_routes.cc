@@ -13,8 +13,8 @@ namespace {
 constexpr const char* kPagePolicy =
     "default-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; "
     "frame-ancestors ";
-// The only page that pages of other origins may show in a frame, and the query parameter that such
-// a frame must have in its URL.
+// Pages of other origins may show only the viewer in a frame, and only if the URL of the frame has
+// the query parameter kEmbed.
 constexpr const char* kViewerPage = "viewer.html";
 constexpr const char* kEmbed = "embed";
 

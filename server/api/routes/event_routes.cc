@@ -88,8 +88,8 @@ void EventFeed::add_changes(std::string& text) {
     ended_ = true;
     return;
   }
-  // A new stream begins with the event "job", which has the current state. So the client does not
-  // need the state changes before it; only a resumed stream sends them.
+  // A new stream begins with the event "job", which has the current state. So its first call sends
+  // no earlier state changes. A resumed stream first sends the changes that the client has missed.
   const bool resumed = last_number_ >= 0;
   for (const JobEvent& event : context_.queue.events_after(id_, last_number_)) {
     if (resumed) text += event_text("state", state_data(event), event.number);

@@ -21,8 +21,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxKeyChars = 255;
-constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends after the job with which it
-                                             // exceeds this size
+constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends after the first job with
+                                             // which it has at least this size
 constexpr size_t kJobsPerRead = 16;
 // Maximum size of a stored request. The service keeps the request as long as the job, and includes
 // it in every answer about the job.
@@ -251,8 +251,8 @@ JobFilter filter_of(const Call& call) {
   return filter;
 }
 
-// Adds the jobs of a page to `body`: up to filter.limit jobs, and no more jobs once the page has
-// kMaxPageBytes. Reads a few jobs at a time. Returns the JSON of next_cursor.
+// Adds the jobs of a page to `body`: up to filter.limit jobs, or fewer if the page reaches
+// kMaxPageBytes first. Reads a few jobs at a time. Returns the value of next_cursor as JSON.
 std::string add_page(Context& context, JobFilter filter, std::string& body) {
   size_t missing = filter.limit;
   bool more = true;
@@ -320,7 +320,7 @@ Response retry_job(Context& context, Call& call) {
   if (job.state == JobState::kFailed || job.state == JobState::kCanceled)
     context.tasks.make(parse_job_request(job.request), JobTask::Kind::kBuild);
   const Job queued = context.dispatcher.retry(job.id);
-  // Forgets the partial view, because the job's scene may have been replaced since the last
+  // Forgets the partial view, because the job's scene can have been replaced since the last
   // attempt.
   if (has_ended(job.state)) context.partial.close(job.id);
   return job_response(context, 202, queued);

@@ -53,7 +53,7 @@ std::string content_range(const ByteRange& range, uint64_t size) {
 
 RangeAnswer requested_ranges(const Request& request, const std::string& tag, uint64_t size) {
   const auto condition = request.headers.find("If-Range");
-  // If-Range may also contain a date or another entity tag. In both cases the answer is the
+  // If-Range can also contain a date or another entity tag. In both cases the answer is the
   // complete file.
   if (condition != request.headers.end() && trimmed(condition->second) != tag) return {};
   // Only GET requests can have ranges (RFC 9110, 14.2).

@@ -95,7 +95,7 @@ query::ColorPageAddress parse_page(const std::string& text) {
 }
 
 // Parses the comma-separated addresses in `list`, the value of the query parameter `name`. Throws
-// Problem (400) if there are more than `most`.
+// Problem (400) if there are more than `most` addresses.
 template <class Parse>
 auto parse_batch(const std::string& name, std::string_view list, size_t most, const Parse& parse) {
   std::vector<decltype(parse(std::string()))> addresses;
@@ -131,8 +131,8 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
   response.headers.emplace("ETag", "W/\"" + tag + '"');
   response.headers.emplace("Vary", "Accept-Encoding, Authorization");
   const std::string known = call.request.header("If-None-Match");
-  // The value "*" matches any tile that exists. The service knows that a tile exists only after it
-  // has made the tile.
+  // For the value "*", which matches every existing tile, the answer is the tile instead of 304.
+  // The service would have to make the tile to find out whether it exists.
   if (trimmed(known) != "*" && has_tag(known, '"' + tag + '"')) {
     response.status = 304;
     return response;
@@ -158,9 +158,10 @@ void expect_unchanged(const TileSource& dag) {
     throw Problem(410, "gone", "the file was replaced while being read: get the manifest again");
 }
 
-// Calls `answer` and returns its response, or throws its error, but only if the file was readable
-// and unchanged during the call. Otherwise throws another error, because the result is meaningless:
-// unreadable pages read as zeros, and a file that is being overwritten mixes old and new parts.
+// Calls `answer`. If the file was readable and unchanged during the call, returns the response of
+// `answer` or throws its error. Otherwise this result is meaningless, and the function throws
+// another error. (Unreadable pages read as zeros, and a file that is being overwritten mixes old
+// and new parts.)
 template <class Answer>
 Response consistent_response(const Call& call, const TileSource& dag, const Answer& answer) {
   dag.expect_readable();  // a file known to be damaged is not read again
@@ -205,7 +206,7 @@ Response get_tile(const Call& call, const TileSource& dag) {
 }
 
 // Calls make(address) for each address, and returns all results, each preceded by its length in
-// bytes. Disks may be slow, so the function throws as soon as the client has disconnected. A
+// bytes. Disks can be slow, so the function throws as soon as the client has disconnected. A
 // stopping service closes all connections, so it also ends this function.
 template <class Addresses, class Make>
 std::string batch_of(const Call& call, const Addresses& addresses, const Make& make) {

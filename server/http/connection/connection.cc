@@ -13,10 +13,10 @@ namespace {
 
 constexpr size_t kBufferBytes = 16384;
 constexpr double kLingerS = 1;
-// Maximum bytes that linger() discards. This is more than the buffers of the kernel and of a proxy
-// hold, because a proxy reads the answer only after it has sent all bytes in its buffers.
+// Maximum bytes that linger() discards. A proxy reads the answer only after it has sent all bytes
+// in its buffers. So this number is larger than the buffers of the kernel and of a proxy together.
 constexpr size_t kLingerBytes = 16 << 20;
-constexpr double kSteadyRates = 8;  // the steady rate as a multiple of the minimum rate
+constexpr double kSteadyRates = 8;  // steady rate (struct Pace) in multiples of the minimum rate
 
 }  // namespace
 
@@ -185,7 +185,8 @@ void Connection::linger() {
   if (error_ == ErrorState::kBroken || !lingers_) return;
   tls_.shutdown();
   if (shutdown(socket_, SHUT_WR) != 0) return;
-  // Makes this connection the first one that the table closes in favor of a new one.
+  // Counts as waiting since the time 0. So the table closes this connection before any other
+  // connection if it needs space for a new connection.
   table_.set_waiting(place_, 0, ConnectionTable::Waiting::kForRequest);
   const double deadline = wall_seconds() + kLingerS;
   for (size_t bytes = 0; bytes < kLingerBytes;) {

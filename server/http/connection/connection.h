@@ -71,8 +71,9 @@ class Connection {
  private:
   enum class Phase { kWaiting, kHeader, kExchange };
   // Time spent waiting for the client in this phase, minus the time that the transferred bytes take
-  // at a given rate. `behind_minimum_s` uses the minimum rate. `behind_steady_s` uses a multiple of
-  // that rate. A client that is faster than this multiple is not evicted.
+  // at a given rate. `behind_minimum_s` uses the minimum rate. `behind_steady_s` uses the *steady
+  // rate*, a multiple of the minimum rate. A client that is faster than the steady rate is not
+  // evicted.
   struct Pace {
     double behind_minimum_s = 0;
     double behind_steady_s = 0;

@@ -48,8 +48,8 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
   const auto same = by_client_.find(client);
   if (same != by_client_.end() && same->second >= limits_.max_per_client && !is_exempt)
     return false;
-  // The table may have more entries than connections, because an evicted connection remains in the
-  // table until its thread has ended.
+  // The table can have more entries than open connections, because an evicted connection remains in
+  // the table until its thread has ended.
   const size_t max_entries = limits_.max_connections + limits_.max_connections / 4 + 1;
   if (!removed_.wait_for(lock, kMaxEvictionWait, [&] { return entries_.size() < max_entries; }) ||
       (entries_.size() >= limits_.max_connections && !evict_one()))
@@ -60,9 +60,9 @@ bool ConnectionTable::admit(int socket, const std::string& address, Place& place
   return true;
 }
 
-// Closes the connection that has waited longest. Returns false if no connection may be closed. The
-// connection's thread then finds the end of the stream and removes the entry. Until then the table
-// has both this entry and the entry of the new connection.
+// Closes the connection that has waited longest. Returns false if no connection may be closed.
+// Later, the thread of the closed connection finds the end of the stream and removes its entry.
+// Until then, the table has this entry and the entry of the new connection.
 bool ConnectionTable::evict_one() {
   return evict_longest([](const Entry&) { return true; });
 }

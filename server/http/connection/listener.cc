@@ -67,8 +67,9 @@ Listener::Listener(const std::string& address, int port) {
   // Allows the use of a port whose old connections are still closing, but not of a port on which
   // another socket listens.
   setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  // Without this limit, segments over the loopback interface have 64 KiB. The kernel sizes the
-  // buffers of both ends by the segments, so a connection would have several MB.
+  // Without this limit, segments over the loopback interface have 64 KiB. The kernel chooses the
+  // size of the buffers of both ends by the segment size, so the buffers of a connection would have
+  // several MB.
   setsockopt(socket_, IPPROTO_TCP, TCP_MAXSEG, &kMaxSegmentBytes, sizeof kMaxSegmentBytes);
   if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
       ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {

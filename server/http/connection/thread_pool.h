@@ -1,5 +1,5 @@
 // A pool of threads that grows with the number of concurrent tasks, so that a task never waits for
-// another one. The caller limits the number of concurrent tasks. Thread-safe.
+// another task. The caller limits the number of concurrent tasks. Thread-safe.
 #pragma once
 
 #include <condition_variable>

@@ -33,7 +33,7 @@ struct Request {
   // most once. If the body is not read to its end, the connection is closed after the answer.
   using Sink = std::function<bool(std::string_view piece)>;
   std::function<BodyEnd(const Sink& sink)> read_body;
-  // Like read_body, for a body that the handler keeps in memory: JSON. The complete body must
+  // Like read_body, for a JSON body, which the handler keeps in memory. The complete body must
   // arrive within grace_s, however fast its bytes follow each other.
   std::function<BodyEnd(const Sink& sink)> read_short_body;
 

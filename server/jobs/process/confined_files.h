@@ -13,8 +13,9 @@ namespace voxdag::server {
 
 class ConfinedFiles : public ForwardingFiles {
  public:
-  // `readable`: paths of files, and paths of folders, ending in '/', whose files may all be read. A
-  // path that does not exist yet must not contain symbolic links, "." or "..".
+  // `readable` has the paths of files that may be read, and of folders all of whose files may be
+  // read. The path of a folder ends in '/'. A path that does not exist yet must not contain
+  // symbolic links, "." or "..".
   ConfinedFiles(FileSystem& files, const std::vector<std::string>& readable);
 
   // These functions open a file for reading. Error messages contain `path` as given. They throw

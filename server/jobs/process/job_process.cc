@@ -157,7 +157,8 @@ int run_job(FileSystem& files, const std::string& path, const CancelToken& cance
   } catch (const std::bad_alloc&) {
     return fail(ErrorCode::kOutOfMemory, out_of_memory_error().message());
   } catch (const std::system_error& error) {
-    // Clients do not see the message of other errors, which may contain paths.
+    // The message of a std::system_error can contain paths. So clients get only the system's text
+    // for its error number. The message for a lack of memory contains no path.
     const Error known = voxdag::error_of(error);
     return fail(known.code(), known.code() == ErrorCode::kOutOfMemory
                                   ? known.message()

@@ -41,8 +41,9 @@ class ProgressPipe : public Progress {
   void finish(const std::string& result_json);
 
  private:
-  // The caller of these functions, except tick(), must hold the mutex. If `now` is true, sends even
-  // if the previous message was sent less than the minimum interval ago.
+  // The caller of these functions, except tick(), must hold the mutex. If `now` is false,
+  // send_advance() and report_subvolumes() do nothing until the minimum interval since the previous
+  // message has passed.
   void send(const Message& message);
   void send_advance(bool now);
   void report_subvolumes(bool now);

@@ -35,8 +35,8 @@ constexpr std::string_view kNames[] = {
 constexpr size_t kKinds = std::variant_size_v<Message>;
 static_assert(std::size(kNames) == kKinds);
 
-// True if all numbers in the object and, down to `depth` levels, in its objects are unsigned
-// integers. The JSON library would silently convert other numbers.
+// True if all numbers in `object` are unsigned integers. Also checks the objects in it, down to a
+// nesting depth of `depth`. The JSON library would silently convert other numbers.
 bool has_whole_numbers(const nlohmann::json& object, int depth) {
   for (const auto& member : object) {
     if (member.is_number() && !member.is_number_unsigned()) return false;

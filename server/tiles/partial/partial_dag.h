@@ -41,7 +41,7 @@ class PartialDag {
   // brick, whose occupied cells are solid.
   uint64_t add_coarse(uint32_t level, uint64_t brick);
   uint64_t add_solid(uint32_t level);
-  // Adds a node of which the octants in `mask` are solid and the others empty.
+  // Adds a node whose octants in `mask` are solid. All other octants are empty.
   uint64_t add_octants(uint32_t level, uint32_t mask);
   uint64_t add_node(uint32_t level, uint32_t mask, const std::vector<uint64_t>& children);
   uint64_t add_brick(uint64_t brick);

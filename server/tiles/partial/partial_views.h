@@ -40,8 +40,8 @@ class PartialViews {
   template <class Read>
   auto read(const std::string& job, const JobFolder& folder, const Read& read);
   std::shared_ptr<PartialView> view_of(const std::string& job, const JobFolder& folder);
-  // Returns the view of a job and makes it the most recently used one; null if the job has none.
-  // Call it with the mutex held.
+  // Returns the view of a job, and makes it the most recently used view. Returns null if the job
+  // has no view. Call it with the mutex held.
   std::shared_ptr<PartialView> find(const std::string& job);
 
   FileSystem& files_;

@@ -28,8 +28,8 @@ export function unitText(text, unit) {
   return `${text} ${text === "1" ? unit.replace(/s$/, "") : unit}`;
 }
 
-// Joins two texts with the same unit, or with different units: "1.40 MiB", "3.20 MiB" -> "1.40 –
-// 3.20 MiB".
+// Joins the texts of two values to a range. If both have the same unit, the unit is written once:
+// "1.40 MiB", "3.20 MiB" -> "1.40 – 3.20 MiB".
 export function rangeText(low, high) {
   const unit = / [A-Za-z]+$/.exec(high)?.[0];
   return `${unit && low.endsWith(unit) ? low.slice(0, -unit.length) : low} – ${high}`;

@@ -98,8 +98,8 @@ async function putPart(path, file, offset, onProgress, signal) {
   });
 }
 
-// Resolves to the headers with the digest of a part. They are empty where crypto.subtle is missing:
-// it exists only on https and localhost, and the digest is optional.
+// Resolves to the headers with the digest of a part. Without crypto.subtle, which exists only on
+// https and localhost, resolves to no headers, because the digest is optional.
 async function digestHeader(part) {
   if (!crypto.subtle) return {};
   const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", part));

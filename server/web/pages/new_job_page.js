@@ -30,7 +30,8 @@ class NewJob {
     });
     this.labels = h("input", {autocomplete: "off", on: {change: () => this.changed()}});
     this.error = h("div", {role: "alert"});
-    // The idempotency key changes only with the form, so that a double click creates only one job.
+    // A double click sends two requests with the same idempotency key, so only one job is created.
+    // The key changes when the user changes the form.
     this.key = randomKey();
     this.submit = h("button", {class: "primary"}, "Submit");
     this.element =

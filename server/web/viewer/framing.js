@@ -10,13 +10,14 @@ const kWideAspect = 16 / 9, kTallAspect = 1 / 2;
 // ratio. `wide` and `tall` are the placements of the same view for kWideAspect and kTallAspect.
 // `box` is the box of the scene. All positions are in voxels.
 //
-// The view direction is fixed, so only the distance of the eye changes. Let s be the position of a
-// point of the scene on the axis from the target to the eye. The point fits the width of the
-// picture if the eye is at s + x / aspect or beyond, where x depends only on the position of the
-// point across this axis. For a smaller aspect ratio than kTallAspect, the eye must move back, and
-// a point with the lowest s moves it the most. For a larger one, the eye may move forward, and a
-// point with the highest s allows the least. The points that touch the sides of the picture are
-// unknown, so `limit`, the lowest or highest s of the box, replaces their s.
+// The view direction is fixed, so only the distance of the eye changes. All positions below are
+// along the axis from the target to the eye. A point of the scene at the position s fits the width
+// of the picture if the eye is at s + x / aspect or farther, where x depends only on the position
+// of the point across the axis. With `tall`, the eye is at tallAt, so a point that touches the side
+// of the picture has x = (tallAt - s) * kTallAspect. For another aspect ratio, the eye must be at s
+// + (tallAt - s) * kTallAspect / aspect. The s of these points is unknown, so `limit` replaces it:
+// the s in the box for which the eye must be farthest. If `aspect` is less than kTallAspect, this
+// is the lowest s, otherwise the highest s.
 export function framed(wide, tall, box, aspect) {
   if (!tall || !box || aspect >= kWideAspect) return wide;
   const back = normalize(subtract(wide.eye, wide.target));

@@ -66,7 +66,7 @@ TEST_F(Reorder, CommandsThatReadBothOrders) {
 }
 
 // Exported DAGs contain the nodes of the file, so an export of a reordered file has the same size.
-// The order of its nodes may differ.
+// The order of its nodes can differ.
 TEST_F(Reorder, ExportsOfDags) {
   const std::array<const char*, 3> exports[] = {
       // format, name of the output, name of the file with the nodes
@@ -103,14 +103,14 @@ TEST_F(Reorder, CommandsThatNeedTheOrderByHash) {
                  command);
     EXPECT_FALSE(exists("x.vdag"));
   }
-  // A file to paste may have either order, because its nodes are sorted again.
+  // A file to paste can have either order, because its nodes are sorted again.
   const Json pasted =
       run_json({"edit", "plain.vdag", "--paste", "plain_first.vdag@0,0,0", "-o", "x.vdag"});
   EXPECT_EQ(pasted["sha256"], run_json({"info", "plain.vdag", "--digest"})["sha256"]);
 }
 
-// A build with --order equals a build that is reordered, also with attributes. A work folder of
-// another order is refused.
+// A build with --order writes the same file as a build without it that is followed by reorder, also
+// with attributes. A build refuses the work folder of a build with another order.
 TEST_F(Reorder, Builds) {
   const Json plain = run_json({"build", "c.glb", "-r", "64", "-o", "x.vdag", "--order",
                                "first-parent", "--memory", "64MiB", "--keep-work"});

@@ -55,7 +55,8 @@ TEST_F(RadiusOption, VerifyFindsAnotherRadius) {
   EXPECT_TRUE(is_found);
 }
 
-// With a seed, the cube starts around this point, so it must be empty there.
+// With --seed, the cube of V + 1 voxels per edge (docs/solid.md) starts around the seed. So the
+// build fails if the cube does not fit into the empty space there.
 TEST_F(RadiusOption, StartsAtTheSeed) {
   const auto seeded = [&](const char* radius, const char* seed) {
     auto arguments = build(radius);

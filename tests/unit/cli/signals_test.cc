@@ -19,8 +19,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Runs `command` in a child process that has just received SIGTERM, whose handler cancels the
-// command's token. The process calls `prepare` before the signal. Returns its exit status.
+// Runs `command` in a child process in which catch_signals() handles signals and which has just
+// received SIGTERM. So the command's token is canceled. The process calls `prepare` before the
+// signal. Returns the exit status of the process.
 int interrupted(
     const std::function<void(CancelToken& cancel)>& command,
     const std::function<void()>& prepare = [] {}) {

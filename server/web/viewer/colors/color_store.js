@@ -8,8 +8,8 @@ import {TilePool} from "../tiles/tile_pool.js";
 
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
-// Before a view has had kRoundsToKnow readings of the feedback, pages that were used within this
-// time are not evicted, because the view may still use them.
+// In the first kRoundsToKnow readings of a view, pages that were used within this time are not
+// evicted, because the view possibly still uses them.
 const kRecentMs = 1500;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when pages are evicted
 const kTableShare = 1 / 5;  // share of the budget for the hash table
@@ -108,10 +108,11 @@ export class ColorStore {
     return fits(count, 1);
   }
 
-  // Adds an entry to the hash table: the page at `place` has its first block at `number` minus 1. A
-  // search (probe) starts at the hash of the page and ends at the next free entry; some entries are
-  // always free. An entry has four words: x and the level; y; z; and `number`. The last word is 0
-  // in a free entry.
+  // Adds an entry to the hash table. `place` has the position and the level of a page. `number` is
+  // 1 plus the number of the page's first block. A search (probe) starts at the hash of the page
+  // and ends at the next free entry; some entries are always free. An entry has four words: the
+  // three words of `place` (x with the level, y, z) and `number`. In a free entry, the last word is
+  // 0.
   insert(place, number) {
     let at = this.homeOf(place);
     while (this.words[4 * at + 3] !== 0) at = this.next(at);

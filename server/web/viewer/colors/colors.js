@@ -7,10 +7,11 @@ import {ColorStore, pageKey} from "./color_store.js";
 const kMebibyte = 1 << 20;
 const kBudgetShare = 1 / 4;   // share of colors in the budget of tiles and colors
 const kMinBytes = 96 * 1024;  // minimum for a pool and a hash table together
-const kBytesPerVoxel = 1024;  // in the worst case: a page per voxel, and as many on coarser levels
-const kBaseBelow = 2;  // levels from a wanted page to the coarser page that is requested first
-// The last word of a feedback texel is 1 + the number of pixels that lack the texel's page
-// (gl/color_shader.js). So at least this value means that the page is missing.
+// Worst case: each voxel needs a page on the finest level and a page on a coarser level.
+const kBytesPerVoxel = 1024;
+const kBaseBelow = 2;  // levels between a wanted page and the coarser page to request first
+// The last word of a feedback texel (gl/color_shader.js) is 0, or 1 plus the number of pixels whose
+// page is missing. So a page is missing if the word is at least kWanted.
 const kWanted = 2;
 
 // Returns the part of the budget for the colors of a file.
@@ -44,7 +45,7 @@ export class Colors {
   }
 
   // Requests the missing pages and marks the used pages. `words` is the color feedback of a picture
-  // of `epoch`.
+  // that was drawn for `epoch` (tiles/tile_store.js).
   takeReading(words, epoch, nowMs) {
     const wanted = new Map();
     for (let at = 0; at < words.length; at += 4) {
@@ -68,9 +69,9 @@ export class Colors {
     this.loader.demand(wanted, nowMs);
   }
 
-  // Adds a page to `wanted`. Its priority is the number of pixels that need it. More pixels need a
-  // coarse page, so coarse pages come first. So even if memory is short, every part of the picture
-  // has colors.
+  // Adds a page to `wanted`. Its priority is the number of pixels that need it. A coarse page
+  // covers more pixels than a fine page, so coarse pages are requested first. So every part of the
+  // picture has colors, even if the memory is too small for all pages.
   want(wanted, level, position, pixels) {
     const key = pageKey(level, ...position), request = wanted.get(key);
     if (request) request.priority += pixels;

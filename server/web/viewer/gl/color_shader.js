@@ -99,9 +99,9 @@ uint spread_bits(int x) {
 }
 
 // Returns the color of the cell with this low corner and 2^scale voxels per edge, or of the nearest
-// coarser cell whose page is loaded. Sets kPageMissing if the color is coarser by at least one
-// level, or by at least three if is_final is false, because finer cells will then soon replace this
-// cell.
+// coarser cell whose page is loaded. Sets kPageMissing if the color is coarser than the cell by at
+// least one level. If is_final is false, finer cells will soon replace this cell, so kPageMissing
+// is set only if the color is coarser by at least three levels.
 uint color_of_cell(ivec3 cell, int scale, bool is_final) {
   int wanted = min(u_levels - scale, u_color_levels);
   ivec3 at = cell >> (u_levels - wanted);
@@ -132,7 +132,7 @@ uniform ivec2 u_size, u_sample;
 layout(location = 0) out uvec4 o_page;
 
 // Returns the page of a pixel's color. The position of the hit is computed again from its distance
-// t. So this position is rounded differently, and may be in a neighboring page.
+// t. So it is rounded differently than in the trace pass, and can be in a neighboring page.
 uvec3 page_of(ivec2 pixel, uvec4 g) {
   vec3 direction = direction_of(vec2(pixel) + 0.5 + u_jitter), p = direction * t_in(g);
   if (axis_in(g) < 3)

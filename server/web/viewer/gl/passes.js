@@ -27,8 +27,8 @@ const kSkyFormats = ["RGBA8"], kFeedbackFormats = ["RGBA32UI"];
 const kColorTexels =
     1 << 17;  // approximate number of texels in the color feedback; a visible page needs one
 
-// Returns the uniforms for a feedback: the edge of the block of pixels per texel, and the pixel of
-// the block that is sampled.
+// Returns the uniforms for a feedback in which each texel represents a block of pixels: the edge of
+// a block in pixels, and the position of the sampled pixel in a block.
 function blocksOf(edge, seed) {
   return {u_block: edge, u_sample: [seed % edge, Math.floor(seed / edge) % edge]};
 }
@@ -53,12 +53,13 @@ export class Passes {
     this.disposed = false;
     this.targets = null;
     this.vertexArray = gl.createVertexArray();
-    // Starts the compilation of the programs that do not depend on the file. If the browser cannot
-    // report the end of a compilation, compile() calls begin() later, so that all programs are
-    // linked before the first result is queried.
+    // begin() waits until the programs that do not depend on the file are compiled. Without
+    // KHR_parallel_shader_compile it would query the status of a program, which blocks until the
+    // program is linked. Then the browser must start to link all programs before the first query,
+    // so compile() calls begin() after it has created the remaining programs.
     this.begun = this.parallel ? this.begin() : null;
     this.begun?.catch(() => {});  // compile() reports the error
-    this.compiled = null;         // promise of compile()
+    this.compiled = null;         // the promise that compile() returns
   }
 
   get colorRange() {
@@ -292,10 +293,10 @@ export class Passes {
     return reading.take();
   }
 
-  // Returns {place, wanted}. `place` is the one of 48 positions of the sun at which the lit share
-  // of the surfaces in the last picture is nearest to `share`. `wanted` is a Map, as in
-  // readFeedback(), of the missing tiles that could change this choice; all its priorities are 1.
-  // Call compileLater() first.
+  // Returns {place, wanted}. `place` is the number of one of 48 positions of the sun: at this
+  // position, the lit share of the surfaces in the last picture is nearest to `share`. `wanted` is
+  // a Map, as in readFeedback(), of the missing tiles that could change this choice; all its
+  // priorities are 1. Call compileLater() first.
   chooseSun(values, share) {
     const {gl, targets} = this, wanted = new Map();
     const target = new Target(gl, kSunPlaces, kSunRows, ["RGBA32UI"]),

@@ -105,7 +105,8 @@ uniform int u_frame;         // number of the sample
 
 struct Surface {
   vec3 center, face, direction;
-  float t, size, cube;  // cube: 1 if voxels appear as cubes, 0 as a smooth surface, between: a mix
+  // cube: 1 if voxels appear as cubes, 0 if they appear as a smooth surface; between: a mix
+  float t, size, cube;
 };
 Surface surface_at(ivec2 pixel, uvec4 g) {
   Surface s;
@@ -118,7 +119,8 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// Returns the start of a ray to the light, far enough out that the surface's steps do not block it.
+// Returns the start of a ray to the light. It is so far outside the surface that the steps between
+// voxels do not block the ray.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
@@ -160,8 +162,8 @@ vec2 sample_pair(ivec2 pixel, int dimension) {
 const kBlocked = `
 // True if a cell blocks the light. toward: direction to the light; reach: maximum distance.
 bool is_blocked(Surface s, vec3 normal, vec3 toward, float reach, vec2 cone, out Hit hit) {
-  // In a narrow place the start may be in an occupied cell. The second attempt starts on the path
-  // of the camera ray, which is free unless the eye is in an occupied cell.
+  // Where surfaces are close together, the start can be in an occupied cell. The second attempt
+  // starts on the path of the camera ray, which is free unless the eye is in an occupied cell.
   for (int attempt = 0; attempt < 2; ++attempt) {
     vec3 start = attempt == 0 ? start_of(s, normal) : s.direction * max(0.0, s.t - 1.5 * s.size);
     set_ray_from(start, toward);
@@ -306,9 +308,10 @@ void main() {
   o_sky = vec4(sky / 1.1, 1.0);
 }`;
 
-// Writes one texel for each of 48 places of the sun (columns) and each of 40 x 24 probed pixels
-// (rows). Its first word is 0 if the pixel has no surface, 1 if the surface is in shadow, and 2 if
-// it is lit. Its second word is Hit.missing (ray_shader.js) of the ray to the sun if it is blocked.
+// Writes one texel for each of 48 positions of the sun (columns) and each of 40 x 24 probed pixels
+// (rows). The first word of a texel is 0 if the pixel shows no surface, 1 if the surface is in
+// shadow, and 2 if the surface is lit. If the ray to the sun is blocked, the second word is
+// Hit.missing (ray_shader.js) of this ray; otherwise it is 0.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -331,7 +334,8 @@ void main() {
     o_lit = uvec4(1, 0, 0, 0);
     return;
   }
-  // Uses the same detail as query/render, which chooses among the same places.
+  // Uses the same widening of the cone as query/render, which chooses among the same positions of
+  // the sun.
   bool blocked = is_blocked(s, normal, sun, 1e30, vec2(s.size, 0.004), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
@@ -455,7 +459,7 @@ void main() {
 // Writes one texel per block of u_block x u_block pixels. Word 1: Hit.missing of the widest cell
 // whose tile is missing, or else of a shadow's ray. Word 2: the width of this cell in pixels, and
 // the brightness of the pixel u_sample, which differs between frames. Word 3: the slot of a tile
-// that this pixel uses, and half the number of its ray's steps. Word 4: the hit's distance t.
+// that this pixel uses, and half the number of steps of its ray. Word 4: the distance t of its hit.
 export const kFeedback = `${kVersion}${kCameraSource}${kSky}${kSkyFilter}
 uniform usampler2D u_shadow_missing;
 uniform int u_block;

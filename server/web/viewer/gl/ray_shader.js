@@ -23,7 +23,8 @@ uniform uint u_root;  // pointer to the root (see tiles/tile_format.js)
 uniform int u_levels;        // the grid has 2^u_levels voxels per edge
 uniform uint u_boundaries;   // bit s: nodes with 2^s voxels per edge are the roots of tiles
 uniform ivec3 u_clip_low, u_clip_high;
-uniform vec2 u_cell_sizes;  // smallest and largest cell that is hit as one cell, in voxels
+// In voxels. Cells up to x wide are always hit as one cell, and cells wider than y never.
+uniform vec2 u_cell_sizes;
 
 uvec4 texel(uint address) {
   return texelFetch(u_pool, ivec2(address & 4095u, address >> 12), 0);
@@ -126,8 +127,8 @@ void note_wire(ivec3 position, int scale, int axis, float t) {
 
 // Finds the first occupied cell between t_min and t_max; returns false if no cell is hit. The cone
 // around the ray is cone.x + cone.y * t wide. An occupied cell that is no wider than the cone is
-// hit as one cell, without a descent to finer cells. If a tile is not loaded, the finest cells of
-// its coarse brick are also hit as one cell.
+// hit as one cell, without a descent to finer cells (within the limits of u_cell_sizes). If a tile
+// is not loaded, the finest cells of its coarse brick (tile_format.js) are also hit as one cell.
 bool trace(float t_min, float t_max, vec2 cone, out Hit hit) {
   int edge = 1 << u_levels;
   ivec3 mirrored = ivec3(ray_mirror >> 2 & 1u, ray_mirror >> 1 & 1u, ray_mirror & 1u);

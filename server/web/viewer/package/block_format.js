@@ -45,8 +45,10 @@ export class TileBlock {
     const columns = new Columns(bytes), head = columns.take(4);
     Object.assign(this, {level, levels, bricks, count});
     this.size = bytes.length;
-    this.masks = [];   // by level of the tiles: the child masks of all nodes
-    this.starts = [];  // by level: the index of each tile's first node; last: of its first leaf
+    this.masks = [];  // by level of the tiles: the child masks of all nodes
+    // By level: the index of the first node of each tile. The last entry has the index of the first
+    // leaf of each tile.
+    this.starts = [];
     let starts = Uint32Array.from({length: count + 1}, (_, i) => i);
     for (let i = 0; i < levels; ++i) {
       const masks = columns.take(starts[count]);
@@ -140,8 +142,9 @@ function childStarts(masks, starts) {
   return children;
 }
 
-// Returns the tile number of each leaf; the leaves are cut-off nodes. `next` is the number of the
-// first new reference in the block.
+// Returns, for each leaf of a block, the number of the tile to which it refers. All leaves are
+// cut-off nodes. A leaf either refers to the next new tile number, or has an old reference: a
+// stored distance to an earlier number. `next` is the first new number.
 function readNumbers(columns, count, next) {
   const old = columns.take(Math.ceil(count / 8)), numbers = new Uint32Array(count);
   const isOld = (i) => old[i >>> 3] >>> (i & 7) & 1;

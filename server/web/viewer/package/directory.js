@@ -1,4 +1,4 @@
-// The directory of a package (docs/format.md, "Packages"): it tells where each block is stored. A
+// The directory of a package (docs/format.md, "Packages"), which has the position of each block. A
 // small directory is fetched in one piece, a large one page by page.
 
 import {TileError} from "../tile_source.js";
@@ -34,8 +34,8 @@ export class Directory {
     return {pack: entries.packs[i], offset: entries.offsets[i], bytes: entries.lengths[i]};
   }
 
-  // Resolves to the only block of a color band that may contain the page with the Morton code
-  // `code`: the last block whose first code is not larger.
+  // Resolves to the only block of a color band that can contain the page with the Morton code
+  // `code`: the last block whose first page has a code of at most `code`.
   async colorBlock(band, code, options) {
     const begin = this.firstBlocks[band], end = begin + this.bands[band].blocks;
     const lastPage = Math.floor((end - 1) / kPageBlocks);

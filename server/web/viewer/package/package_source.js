@@ -134,8 +134,8 @@ export class PackageSource {
     return answers;
   }
 
-  // Begins to load those `blocks` that are not in this.blocks. One request fetches several blocks
-  // that are close together in a pack.
+  // Begins to load the blocks of the list `blocks` that are not in this.blocks. One request fetches
+  // several blocks that are close together in a pack.
   async load(blocks, options) {
     const wanted = [];
     for (const block of blocks) {
@@ -174,8 +174,8 @@ export class PackageSource {
       const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
       const decode = (bytes) => this.decode(each.block, part(bytes), bytes.isRange);
       each.resolve(reads.then(decode).catch((error) => {
-        // If no range has been right so far, the server may send wrong ranges. Then fetches the
-        // complete file.
+        // If no answer to a range request was correct so far, the server possibly sends wrong
+        // ranges. In this case, fetches the complete file.
         if (error.status !== 200 || this.files.rangesAreProven || !this.files.hasRanges)
           throw error;
         this.files.hasRanges = false;
@@ -207,7 +207,7 @@ export class PackageSource {
         plain, level, tileShape(this.info, level), Math.min(kBlockTiles, tiles - first));
   }
 
-  // Removes the least recently used blocks from this.blocks until the others fit in
+  // Removes the least recently used blocks from this.blocks until the remaining blocks have at most
   // kMaxCachedBytes. Keeps blocks that are still loading, because their size is unknown.
   evict() {
     for (const [block, loads] of this.blocks) {

@@ -11,7 +11,8 @@ import {PackageSource} from "./package_source.js";
 // If the page itself contains the package, the URL is "".
 const kUrl = document.querySelector("meta[name=voxdag-package]").content;
 
-// The poster shows the first camera of the file. If the address has another camera, it is removed.
+// The poster shows the view with which the page begins. If the address of the page has a camera,
+// the page begins with another view, so the poster is removed.
 if (cameraTexts(new URLSearchParams(location.hash.slice(1))))
   document.getElementById("poster")?.remove();
 

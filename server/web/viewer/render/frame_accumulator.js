@@ -49,8 +49,8 @@ export class FrameAccumulator {
     const {drawing, context: {gl}} = this;
     if (gl.getSyncParameter(drawing.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
     gl.deleteSync(drawing.fence);
-    // A pool has grown since the sample began, so its texture was replaced, and the remaining parts
-    // would read the old texture. The sample is abandoned.
+    // If a pool has grown since the sample began, its texture was replaced. The remaining parts
+    // would still read the old texture, so the sample is abandoned.
     if (drawing.poolTextures.some((texture, i) => texture !== poolTextures[i])) {
       this.drawing = null;
       return true;

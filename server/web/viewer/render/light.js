@@ -47,7 +47,7 @@ export class Light {
     this.readings = 0;
   }
 
-  // Places the sun behind the left shoulder of the first camera, which looks along `forward`.
+  // Places the sun behind and to the left of the first camera, which looks along `forward`.
   placeSun(eye, forward) {
     const back = scale(forward, -1);
     this.outside = this.seesFloor(eye);

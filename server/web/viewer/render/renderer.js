@@ -29,8 +29,8 @@ const kBudgetBytes = 256 << 20, kPhoneBudgetBytes = 64 << 20;
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;
 const kMovingMs = 180;  // duration of "moving" after the last change of the view
 const kSamples = 16;    // number of samples per pixel of a still picture
-// A picture counts as the first one if its cells with missing tiles are narrower than this number
-// of pixels.
+// Statistics record the time of the first picture in which all cells with missing tiles are
+// narrower than this number of pixels.
 const kFirstPicturePixels = 16;
 
 export class Renderer {
@@ -60,7 +60,7 @@ export class Renderer {
     this.view = null;
     this.viewMs = -Infinity;  // the time of the last change of the view
     this.isReady = false;     // programs, pool and root are loaded
-    this.started = null;      // {resolve, reject, isDone} of start()
+    this.started = null;      // {resolve, reject, isDone} of the promise of start()
     this.measured = new Statistics(begun?.beginMs ?? performance.now());
     this.pace = new Pace();
     this.progress = new ViewProgress();
@@ -166,8 +166,8 @@ export class Renderer {
   }
 
   // Resolves when all tiles for the canvas pixels have arrived and the sun is placed. Inside a
-  // scene, placing the sun needs further tiles, so the promise waits while the service does not
-  // answer.
+  // scene, placing the sun needs further tiles. So the promise remains pending while the service
+  // does not answer.
   complete() {
     if (this.isReady && this.isComplete && this.progress.isFullSize && this.isSunPlaced &&
         !this.frames.reading)
@@ -329,7 +329,7 @@ export class Renderer {
     read.coarsePixels *= this.size.height / height;  // pixels of the canvas
     this.measured.noteFrame(read, width * height);
     pace.frameDone(now - sample.partMs, sample.busyMs, width * height, isMoving || !isFull);
-    // The light does not change while samples of a still picture are accumulated.
+    // The light changes only during the first quarter of the samples of a still picture.
     if (read.exposure !== null && this.frames.samples <= kSamples / 4)
       this.light.adjust(read, this.view.eye, isMoving);
     progress.coarsePixels = read.coarsePixels;
@@ -343,8 +343,8 @@ export class Renderer {
   }
 
   // Records whether a sample's reading has no missing tiles. Once the view is complete, places the
-  // sun. An outdated sample cannot show that the view is complete: tiles arrived after it began,
-  // and may refer to further tiles that are missing.
+  // sun. An outdated sample cannot show that the view is complete: tiles have arrived since the
+  // sample began, and these tiles can refer to further missing tiles.
   judgeProgress({isMoving, isFull, isOutdated}, now) {
     const {progress} = this, {isQuiet} = this.stream;
     progress.takeReading(!isMoving && isQuiet && !isOutdated, isFull);

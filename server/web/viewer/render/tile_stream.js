@@ -15,8 +15,8 @@ const kMaxFirstWaitMs = 400;  // maximum time that the first frame waits for the
 
 export class TileStream {
   // `options` are the renderer's options; `color` decides whether color pages are loaded.
-  // onArrival(failed) is called when a tile or page has arrived, or with `failed` set when a
-  // request has failed or the retry state has changed.
+  // onArrival() is called when a tile or page has arrived. onArrival(true) is called when a request
+  // has failed or the state of retries has changed.
   constructor(gl, source, info, options, budgetBytes, onArrival) {
     this.info = info;
     this.options = options;
@@ -87,7 +87,8 @@ export class TileStream {
         (this.loader.firstView !== null || this.rootPointer === undefined);
   }
 
-  // Requests the tiles and pages that a frame of `epoch` misses, and marks those that it uses.
+  // Takes the reading of a frame that was drawn for `epoch` (tile_store.js). Requests the tiles and
+  // pages that were missing in the frame, and marks the tiles and pages that it used.
   // `pageFeedback` is the reading of the color feedback; null if no colors are shown.
   takeReading(read, pageFeedback, epoch, nowMs) {
     const {loader, store, colors} = this;
@@ -103,12 +104,12 @@ export class TileStream {
     return [this.loader, ...(this.colors && this.options.color ? [this.colors.loader] : [])];
   }
 
-  // Number of tiles and pages that the last reading missed and that may still arrive.
+  // Number of tiles and pages that were missing in the last reading and can still arrive.
   get missingCount() {
     return this.loaders.reduce((sum, each) => sum + each.unmet, 0);
   }
 
-  // True if nothing is under way and no retry is due.
+  // True if no request is queued or in progress, and no request waits for a retry.
   get isQuiet() {
     return this.loaders.every((each) => each.isIdle && !each.awaitsRetry);
   }

@@ -25,9 +25,9 @@ const kListShare = 10, kListPausePerCubeMs = 0.1;
 const kListLooks = 2, kMaxListPauseMs = 15000;
 
 // Shows the job until it has a result. Resolves to false if there was nothing to show, because the
-// subvolumes are not planned yet. Throws WebGLUnavailable, or Problem if the job was deleted. When
-// the promise resolves, the page's address still contains the camera, from which the next viewer
-// takes it. `showTools` fills the page's tools.
+// subvolumes are not planned yet. Throws WebGLUnavailable, or Problem if the job was deleted.
+// Stores the camera in the page's address, so that the next viewer begins with this camera.
+// `showTools` fills the page's tools.
 export async function watchJob({job, place, budgetBytes, showPicture, showTools, signal}) {
   const path = `/api/v1/jobs/${job.id}`;
   const source = new TileSource({base: `${path}/partial`, headers: authorization()});

@@ -4,7 +4,8 @@
 
 import {TileError} from "../tile_source.js";
 
-// Number of readings after which an item that none of them has marked is known to be unused.
+// If an item was marked in none of this number of consecutive readings, the view does not use the
+// item.
 export const kRoundsToKnow = 4;
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
 const kMaxTries = 3;         // tries per item if the answers are unusable
@@ -37,10 +38,10 @@ export function pauseAfter(failures) {
 //     keep(request, answer, nowMs)   false if there is no space; throws if the answer is damaged
 //     nameOf(request)                the item's name for messages
 //
-// and `store.rounds`, the number of readings since the view changed.
+// `store.rounds` must be the number of readings since the view changed.
 export class Loader {
-  // onArrival(failed) is called when an item has arrived, or with `failed` set when a request has
-  // failed or the retry state has changed.
+  // onArrival() is called when an item has arrived. onArrival(true) is called when a request has
+  // failed or the state of retries has changed.
   constructor(source, store, onArrival, {maxRequests, maxBatch}) {
     this.source = source;
     this.store = store;
@@ -48,12 +49,12 @@ export class Loader {
     this.maxRequests = maxRequests;  // concurrent requests
     this.maxBatch = maxBatch;
     this.allowed = maxRequests;  // concurrent requests allowed now; fewer while the service is busy
-    this.batchSize = maxBatch;   // smaller after timeouts
+    this.batchSize = maxBatch;   // maximum size of a batch; smaller after timeouts
     this.queue = [];
     this.loading = new Map();  // key -> request
     // The failures of items, the oldest first: key -> {count, retryMs, batch, last}. `batch` is the
-    // size of the largest batch in which the item is requested. Items with `last` are requested
-    // after all others.
+    // size of the largest batch in which the item may be requested. Items for which `last` is true
+    // are requested after all other items.
     this.failures = new Map();
     this.maxFailures = kMaxFailures;
     this.requests = 0;
@@ -68,7 +69,7 @@ export class Loader {
     this.warnings = 0;
     this.timer = 0;
     this.wakes = new Set();  // times of scheduled wake-ups
-    this.unmet = 0;          // number of items missing in the last reading that may still arrive
+    this.unmet = 0;          // number of items missing in the last reading that can still arrive
     this.ending = new AbortController();
   }
 
@@ -106,13 +107,16 @@ export class Loader {
     return !(nowMs < this.failures.get(key)?.retryMs) && nowMs >= this.fullUntilMs;
   }
 
-  // Replaces the queue by the `requests` of one reading. `unmet`: number of the reading's items
-  // that may still arrive.
+  // Replaces the queue by the `requests` of one reading. `unmet`: number of the reading's missing
+  // items that can still arrive.
   replaceQueue(requests, unmet, nowMs) {
     this.unmet = unmet;
     if (unmet === 0) this.endOutage();
-    // Items that may have caused an error (`last`) are requested after all others, so that they do
-    // not delay other items. Among these, the items with the smallest `batch` come last.
+    // takeBatch() takes items from the end of the queue, so the items that are requested first are
+    // sorted to the end. Items that possibly caused an error (`last`) are requested after all other
+    // items, so that they do not delay these. Among the items with `last`, an item with a smaller
+    // `batch` (the size of the largest batch in which the item may be requested) is requested
+    // later.
     const trust = ({key}) =>
         this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
     this.queue = requests.sort((a, b) => trust(a) - trust(b) || a.priority - b.priority);
@@ -218,7 +222,8 @@ export class Loader {
     else this.split(batch, error, nowMs);
   }
 
-  // One item of the batch may have caused the error. Splits the batch in two to find this item.
+  // One item of the batch possibly caused the error. To find this item, requests the items again in
+  // batches of at most half the size.
   split(batch, error, nowMs) {
     if (batch.length === 1) return this.noteFailure(batch[0], error, nowMs);
     const half = Math.ceil(batch.length / 2);
@@ -229,7 +234,8 @@ export class Loader {
     else this.askAgain(batch);
   }
 
-  // Requeues a batch before all others, in the same order.
+  // Puts a batch back into the queue, so that its items are requested before all other items and in
+  // the same order.
   askAgain(batch) {
     this.queue.push(...batch.reverse());
   }
@@ -290,7 +296,7 @@ export class Loader {
     this.queue = [];
   }
 
-  // True if wanted items are missing and may still arrive after a retry.
+  // True if wanted items are missing and can still arrive after a retry.
   get awaitsRetry() {
     const nowMs = performance.now();
     if (this.hasEnded || this.unmet === 0) return false;

@@ -13,8 +13,8 @@
 import {kRoundsToKnow} from "./loader.js";
 import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js";
 
-// Before a view has had kRoundsToKnow readings, tiles that were used within this time are not
-// evicted, because the view may still use them.
+// In the first kRoundsToKnow readings of a view, tiles that were used within this time are not
+// evicted, because the view possibly still uses them.
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
 const kFreeShare = 1 / 64;  // share of the pool that is freed when tiles are evicted

@@ -287,8 +287,8 @@ TEST(Progress, GoesOnWhereAnEarlierAttemptEnded) {
   EXPECT_DOUBLE_EQ(advanced["rate"].get<double>() * wall_s, 1);
 }
 
-// The map counts subvolumes that an earlier run has built from the start, and each subvolume only
-// once. A split replaces a subvolume with its parts.
+// The map counts each built subvolume once. From the start, it also counts the subvolumes that an
+// earlier run has built. A split replaces a subvolume with its parts.
 TEST(Subvolumes, AreCountedAndListed) {
   SubvolumeMap map;
   const SubvolumeStatus built{1, {0, 0, 0}, 512, true, 10, 5, 100};

@@ -289,7 +289,7 @@ TEST_F(Scenes, AreNotRemovedByAnEarlierDeletion) {
   EXPECT_FALSE(system_files().exists(marked));
   for (const bool at_start : {false, true}) {
     SCOPED_TRACE(at_start);
-    system_files().create(marked)->close();  // as if it had not been removed with the upload
+    system_files().create(marked)->close();  // as if the upload had not removed this file
     at_start ? reopen() : store_->finish_removals();
     EXPECT_FALSE(system_files().exists(marked));
     ASSERT_TRUE(store_->find("a.glb"));
