@@ -105,8 +105,7 @@ uniform int u_frame;         // number of the sample
 
 struct Surface {
   vec3 center, face, direction;
-  // cube: 1 if voxels appear as cubes, 0 if they appear as a smooth surface; between: a mix
-  float t, size, cube;
+  float t, size, cube;  // cube: 1: voxels appear as cubes, 0: as a smooth surface, between: a mix
 };
 Surface surface_at(ivec2 pixel, uvec4 g) {
   Surface s;
@@ -119,8 +118,7 @@ Surface surface_at(ivec2 pixel, uvec4 g) {
   s.cube = clamp((s.size / max(s.t * u_pixel, 1e-9) - 5.0) / 8.0, 0.0, 1.0);
   return s;
 }
-// Returns the start of a ray to the light. It is so far outside the surface that the steps between
-// voxels do not block the ray.
+// Returns the start of a ray to the light, outside the surface so that no voxel step blocks it.
 vec3 start_of(Surface s, vec3 normal) {
   return s.center + normal * (s.size * 2.2 * (1.0 - s.cube)) + s.face * (s.size * 0.01);
 }
@@ -309,9 +307,8 @@ void main() {
 }`;
 
 // Writes one texel for each of 48 positions of the sun (columns) and each of 40 x 24 probed pixels
-// (rows). The first word of a texel is 0 if the pixel shows no surface, 1 if the surface is in
-// shadow, and 2 if the surface is lit. If the ray to the sun is blocked, the second word is
-// Hit.missing (ray_shader.js) of this ray; otherwise it is 0.
+// (rows). First word of a texel: 0 if the pixel shows no surface, 1 if it is in shadow, 2 if it is
+// lit. Second word: Hit.missing (ray_shader.js) of the ray to the sun.
 export const kSunPlaces = 48, kSunRows = 960;
 export const kSun = `${kVersion}${kRaySource}${kCameraSource}${kSky}${kSurface}${kBlocked}
 uniform usampler2D u_normals;
@@ -334,8 +331,7 @@ void main() {
     o_lit = uvec4(1, 0, 0, 0);
     return;
   }
-  // Uses the same widening of the cone as query/render, which chooses among the same positions of
-  // the sun.
+  // The cone and the 48 positions of the sun are the same as in query/render.
   bool blocked = is_blocked(s, normal, sun, 1e30, vec2(s.size, 0.004), hit);
   o_lit = uvec4(blocked ? 1u : 2u, blocked ? hit.missing : 0u, 0, 0);
 }`;
