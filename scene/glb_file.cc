@@ -93,7 +93,7 @@ uint64_t GlbFile::finish() {
 }
 
 bool is_glb_of(const ReadableFile& file, const std::string& generator) {
-  // The descriptions of the largest generated scenes take a few megabytes.
+  // The JSON chunks of the largest generated scenes have a few megabytes.
   constexpr uint64_t kMaxDescriptionBytes = 16 << 20;
   std::string start(std::min(file.size(), kMaxDescriptionBytes), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(start)));

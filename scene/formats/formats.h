@@ -36,10 +36,10 @@ std::string list_scene_endings(const std::string& separator = ", ",
                                const std::string& last_separator = " or ");
 
 // Opens scene files, each of any format, as one scene: the triangles of the first file, then the
-// triangles of the next. The contents determine the format, not the name; only text files with
-// points may also be recognized by their ending. Geometry is read in windows charged to `budget`;
-// images are never read. Opening checks the structure of a file, and reading the triangles checks
-// their contents. `cancel` is checked during both. Throws Error{kInvalidInput}, {kNotFound},
+// triangles of the next. The contents of a file determine its format, not its name. Only text files
+// with points may also be recognized by their ending. Geometry is read in windows charged to
+// `budget`. Images are never read. Opening checks the structure of a file, and reading the
+// triangles checks their contents. Both check `cancel`. Throws Error{kInvalidInput}, {kNotFound},
 // {kLimit} or {kOutOfMemory} with the name of the file. `files`, `budget` and `cancel` must outlive
 // the scene.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,

@@ -54,8 +54,9 @@ class City {
     const Vec3 center{
         kPitch * (static_cast<double>(2 * column) - static_cast<double>(columns_ - 1)) / 2, 0,
         kPitch * (static_cast<double>(2 * row) - static_cast<double>(rows_ - 1)) / 2};
-    // With colors, the color of the ground depends on whether the block becomes a park. This is
-    // decided at random after make_street(), so the ground is then added after the decision.
+    // With colors, the color of the ground depends on whether the block becomes a park. Random
+    // numbers decide this after make_street(). So with colors, the ground is added last, and
+    // without colors it is added first.
     if (!scene_.has_colors()) make_ground(center, false);
     make_street(center, random);
     const bool is_park = random.chance(10);

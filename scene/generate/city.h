@@ -13,9 +13,9 @@ namespace voxdag {
 // Indices into kCityMaterials.
 enum CityMaterial : uint32_t { kGround, kBuildings, kPlants, kCars };
 
-// The numbers of the parts of a city (SceneBuilder), which are stored once and placed many times: a
-// piece of wall with a window (one for each of four directions), a tree, a car along x, and a car
-// along z.
+// The numbers of a city's parts, as SceneBuilder::add_part() returns them. Each part is stored once
+// and placed many times. The parts are a piece of wall with a window (one for each of four
+// directions), a tree, a car along x, and a car along z.
 struct CityParts {
   explicit CityParts(SceneBuilder& scene);
   uint32_t window[4];  // facing +z, +x, -z, -x; unit size; the pane is set back by 1

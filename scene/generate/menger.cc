@@ -1,7 +1,7 @@
 // Menger's sponge of level n: a grid of 3^n unit cells per axis, without the cells that at some
 // scale are in the middle of two or three axes. Every face between a remaining cell and a removed
-// cell or the outside is a unit square with corners on the integer lattice: 2 * 20^n + 4 * 8^n
-// squares.
+// cell or the outside is a unit square with corners on the integer lattice. The sponge has 2*20^n +
+// 4*8^n such squares.
 #include "scene/generate/scene_builder.h"
 
 namespace voxdag {

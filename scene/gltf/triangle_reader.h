@@ -35,9 +35,9 @@ class TriangleReader {
                  MemoryBudget& budget, const CancelToken& cancel);
 
   // Passes triangles [first, first + count) of the document's order to `visit`, in batches of up to
-  // 1024. They are in world space, or snapped to `grid` if it is not null. If `skip_invalid` is
-  // set, omits invalid triangles; otherwise throws Error{kInvalidInput} with an invalid triangle's
-  // node, mesh and primitive.
+  // 1024. They are in world space, or snapped to `grid` if it is not null. Omits invalid triangles
+  // if `skip_invalid` is set. Otherwise throws Error{kInvalidInput} for the first invalid triangle,
+  // with its node, mesh and primitive.
   void read(uint64_t first, uint64_t count, const Grid* grid, const Visitor& visit);
   // Passes triangles [first, first + count) in world space, with their surfaces, to `visit`, in
   // batches of up to 1024.

@@ -51,9 +51,9 @@ StripReader PlyFile::open_strips(MemoryBudget& budget) const {
           budget};
 }
 
-// Reads all elements up to the last one that the layout uses. If a row is not exactly one line,
-// also reads the other elements, because the file is then valid only if no text follows the last
-// one.
+// Reads all elements up to the last one that the layout uses. If some row is not exactly one line,
+// also reads the elements after it, because such a file is valid only if no text follows its last
+// element.
 void PlyFile::pass_over_elements(MemoryBudget& budget, const CancelToken& cancel) {
   uint64_t begin = header_.data_begin;
   for (size_t i = 0; i < header_.elements.size(); ++i) {

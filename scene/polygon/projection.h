@@ -15,8 +15,9 @@ namespace voxdag::polygon {
 struct Projection {
   int axis = 0;              // the axis that the projection drops
   bool is_mirrored = false;  // the other two axes are exchanged
-  // True if no triangle of the fan is clockwise in the plane. Triangles that may be clockwise only
-  // because coordinates are rounded are ignored. Then the fan is inside the polygon.
+  // True if no triangle of the fan is clockwise in the plane. The test ignores triangles that can
+  // be clockwise only because coordinates are rounded. If is_fan is true, the fan is inside the
+  // polygon.
   bool is_fan = false;
 };
 

@@ -117,8 +117,8 @@ bool Sweep::add_between(uint32_t corner, size_t below, bool is_lower) {
 }
 
 // Adds a diagonal from the helper of a lower edge to `node`, which is in the area above that edge.
-// With `only_merges`, adds it only if the helper is a merge. Returns the node that `node`'s corner
-// has in the lowest ring that is open to the right.
+// With `only_merges`, adds it only if is_merge is true for the edge. Returns the node that `node`'s
+// corner has in the lowest ring that is open to the right.
 uint32_t Sweep::connect(size_t edge, uint32_t node, bool only_merges) {
   if (only_merges && !edges_[edge].is_merge) return node;
   return rings_.divide(edges_[edge].helper_node, node);

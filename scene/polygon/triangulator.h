@@ -5,9 +5,9 @@
 // 2. If the fan (c0, c(k), c(k+1)) around the first corner has no clockwise triangle in the plane,
 //    the triangles are this fan. This holds for every convex polygon. Clockwise triangles that the
 //    rounding of the coordinates can explain are ignored.
-// 3. Otherwise, each corner that is collinear with its neighbors is removed, together with the
-//    degenerate triangle of the three. The rest is divided into monotone rings (sweep.h), and these
-//    into triangles (monotone.h).
+// 3. Otherwise, each corner that is collinear with its two neighbors is removed, and the degenerate
+//    triangle of these three corners is added. The rest is divided into monotone rings (sweep.h),
+//    and these into triangles (monotone.h).
 // 4. Exact tests prove that no triangle is clockwise. So the triangles cover exactly the points
 //    that the polygon goes around, whatever its shape.
 // 5. If a triangle is clockwise, or if there is no such division because edges cross each other,

@@ -24,8 +24,9 @@ oracle::SolidRule oracle_rule(SolidRule rule) {
   return rule == SolidRule::kWinding ? oracle::SolidRule::kWinding : oracle::SolidRule::kParity;
 }
 
-// Returns the SolidEntry with which a cube is built: the views (view_of()) from the points of the
-// sample rows on the low faces of the cube, computed from all triangles of the scene.
+// Returns the SolidEntry with which a cube is built: the views (core/geometry/solid_rule.h) from
+// the points in which the sample rows enter the low faces of the cube, computed from all triangles
+// of the scene.
 SolidEntry entry_of(const oracle::Triangles& scene, const Cube& cube, uint32_t levels,
                     SolidRule rule) {
   const int64_t edge = cube.edge_voxels(levels);
@@ -121,9 +122,9 @@ void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, in
   }
 }
 
-// The voxels equal the oracle's if there are very many components of empty voxels that touch no
-// block corner. The backend collects such components, and here must decide them in several batches.
-// Some of them are in the same block.
+// The voxels equal the oracle's if very many components (6-connected sets of empty voxels in a
+// block) contain no voxel at a corner of their block. The backend collects such components, and
+// here it must decide them in several batches. Some of them are in the same block.
 TEST_P(Solids, EqualTheOracleWithManyComponents) {
   const auto backend = open();
   oracle::Triangles scene;

@@ -68,7 +68,7 @@ TEST_P(Thin, TrianglesOfAllKinds) {
 }
 
 // The voxels of large triangles equal the oracle's. Such triangles cover many tiles, whose nodes
-// the CPU backend takes from its plane memo.
+// the CPU backend takes from its cache of planes (core/backend/cpu/memo).
 TEST_P(Thin, LargeFlatSurfaces) {
   const auto backend = open();
   oracle::Random random(32);

@@ -105,7 +105,8 @@ class Maker {
   }
 
   // Returns a triangle in a plane a + b = 256 k or a - b = 256 k, for two axes a and b. The plane
-  // contains edges of voxels. It touches the voxels next to it without entering them.
+  // contains edges of voxels. Of the four voxels at such an edge, it cuts two and touches the other
+  // two only at the edge.
   Triangle diagonal() {
     const int64_t a = random_.between(0, 2), b = (a + random_.between(1, 2)) % 3;
     const int64_t sign = random_.coin() ? 1 : -1;

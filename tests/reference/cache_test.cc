@@ -128,8 +128,9 @@ void add_sheet(const Sheet& sheet, Triangles& out) {
 }
 
 // Returns a tube along z that is open at both ends, a closed box, and a sheet far away from both.
-// The walls along x and y give the inside of the tube 4 of 6 views. The sheet takes one of these
-// views if the tube and the sheet have the same y: then the tube is not filled.
+// Inside the tube, 4 of the 6 directions (core/geometry/solid_rule.h) count as inside, because of
+// its walls along x and y. If the tube and the sheet have the same y, the sheet changes one of
+// these directions, so only 3 count as inside and the tube is not filled.
 Triangles tube_box_and_sheet(int64_t sheet_y) {
   Triangles out;
   const auto add_box = [&](std::array<int64_t, 3> low, std::array<int64_t, 3> high, int axes) {
@@ -176,7 +177,7 @@ TEST_F(CacheTest, ASolidDependsOnItsViews) {
     expect_same_report(cached, moved);
     EXPECT_GT(cached.subvolumes_cached, 20u);
     EXPECT_LT(cached.subvolumes_cached + 20, again.subvolumes_cached);
-    // The entries of the shell are different entries.
+    // The shell does not share the cache entries of the solid.
     after.geometry.solid = voxdag::SolidName::kNone;
     const auto shell = run(after);
     after.run.cache_folder.clear();
@@ -184,7 +185,8 @@ TEST_F(CacheTest, ASolidDependsOnItsViews) {
   }
 }
 
-// Triangles of a solid that occur twice, or with the other orientation, are other content.
+// If triangles of a solid occur twice or with the opposite orientation, its subvolumes have other
+// cache entries.
 TEST_F(CacheTest, ASolidDependsOnOrientationAndCopies) {
   const Triangles once = oracle::make_solid(oracle::SolidKind::kSphere, 3, 64);
   Triangles twice = once, both = once;

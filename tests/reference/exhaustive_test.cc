@@ -12,8 +12,8 @@ oracle::Triangle dot(int64_t x, int64_t y, int64_t z) {
   return {p, {p[0] + 20, p[1], p[2]}, {p[0], p[1] + 20, p[2] + 20}};
 }
 
-// In a grid of 4^3 voxels, the root is a brick. The file equals the oracle's for each single voxel,
-// and for each pair with the first voxel.
+// In a grid of 4^3 voxels, the root is a brick. The file equals the oracle's for each voxel: alone
+// if its number is even, and together with voxel 0 if its number is odd.
 TEST_F(Exhaustive, EveryVoxelOfABrick) {
   for (int v = 0; v < 64; ++v) {
     SCOPED_TRACE(v);

@@ -105,8 +105,9 @@ TEST_F(Radius, Refused) {
   EXPECT_NE(refusal_of(64, 1, SolidName::kWinding).find("to be enclosed"), std::string::npos);
 }
 
-// With a seed, the cube starts around the seed. The solid has the voxels that only this walk, or no
-// walk, covers.
+// With a seed, the walk of an empty cube starts around the seed (tests/oracle/solid/walks.h). The
+// solid has the voxels that are in no empty cube, and the voxels that are only in cubes of this
+// walk.
 TEST_F(Radius, SeedsEqualTheOracle) {
   int enclosed = 0, reached = 0, refused = 0;
   for (const auto kind : {oracle::SolidKind::kNested, oracle::SolidKind::kHoles,

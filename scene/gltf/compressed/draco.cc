@@ -30,9 +30,9 @@ namespace voxdag::gltf {
 namespace {
 
 // Upper bounds of Draco 1.5's allocations in bytes, derived from its code. Measured allocations are
-// about half of them. The bounds cover the tables of corners and vertices, and a smaller table for
-// each attribute with its own connectivity. For each vertex of an attribute, they cover the value
-// (once as integers, once final) and two map entries.
+// about half of these bounds. The bounds cover the tables of corners and vertices, and a smaller
+// table for each attribute with its own connectivity. For each vertex of an attribute, they cover
+// two copies of the value (as integers, and in its final form) and two map entries.
 constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
@@ -45,8 +45,8 @@ constexpr const char* kTooMuchMemory =
     "machine "
     "with more memory";
 
-// Thrown by BoundedDecoder to stop decoding as soon as the number of vertices is known, if only
-// this number is needed.
+// Thrown by BoundedDecoder if the caller needs only the number of vertices. It stops the decoding
+// as soon as this number is known.
 struct VertexCount {
   uint64_t vertices;
 };
@@ -65,7 +65,9 @@ void charge_more(MemoryCharge& charge, uint64_t bytes) {
 template <class Decoder>
 class BoundedDecoder : public Decoder {
  public:
-  // `vertices`: maximum number of vertices, or kCountVertices to throw VertexCount.
+  // `vertices`: maximum number of vertices. With kCountVertices, the decoder only counts the
+  // vertices: it stops before it decodes their attributes, and stores the count in `refusal` as a
+  // VertexCount.
   BoundedDecoder(const DracoHeader& header, uint64_t vertices, MemoryCharge& charge)
       : header_(header), vertices_(vertices), charge_(charge) {}
 
@@ -160,7 +162,8 @@ void decode_as(const DracoHeader& header, std::span<const std::byte> data, Memor
 }
 
 // Decodes Draco data into `mesh`. `compressed` includes the header. `max_vertices` is the maximum
-// number of vertices, or kCountVertices to throw VertexCount.
+// number of vertices. With kCountVertices, decode_mesh() only counts the vertices: it stops before
+// it decodes their attributes, and throws the count as a VertexCount.
 void decode_mesh(std::span<std::byte> compressed, const DracoHeader& header, MemoryCharge& charge,
                  uint64_t max_vertices, draco::Mesh& mesh) {
   charge_more(charge,
@@ -197,7 +200,7 @@ void write_faces(const DracoPart& part, const draco::Mesh& mesh,
                  const Writer<uint32_t>::Write& write) {
   Writer<uint32_t> out(write);
   const uint64_t faces = mesh.num_faces(), triangles = part.corners / 3;
-  // A strip can declare more triangles than Draco has faces, because it counts degenerate
+  // A strip can declare more triangles than the Draco data have faces, because it counts degenerate
   // triangles. The last face is repeated for the missing triangles.
   for (uint64_t i = 0; i < triangles; ++i) {
     const draco::Mesh::Face& face =

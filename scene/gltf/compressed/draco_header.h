@@ -12,8 +12,9 @@ struct DracoHeader {
   bool is_edgebreaker = false;  // false: the faces are stored one after another
   bool has_valences = false;    // edgebreaker with one context per vertex valence
   uint64_t faces = 0;
-  // Number of vertices. Edgebreaker counts a position once, even if faces give it different other
-  // attributes. The decoded mesh then has several vertices at this position.
+  // Number of vertices. Edgebreaker counts the vertices at one position once, even if the faces
+  // there give them different values of other attributes. The decoded mesh then has several
+  // vertices at this position.
   uint64_t vertices = 0;
   // Number of attributes that have their own connectivity table. An attribute needs one if corners
   // with the same position can have different values of it. Edgebreaker only.

@@ -1,4 +1,4 @@
-// Checks the meshes and skins that the scene draws. All others may be broken.
+// Checks the meshes and skins that the scene draws. Other meshes and skins are not checked.
 #pragma once
 
 #include <string>

@@ -1,8 +1,8 @@
 // Compressed geometry: EXT_meshopt_compression and KHR_meshopt_compression compress buffer views,
-// KHR_draco_mesh_compression compresses primitives. The document gets an additional buffer for the
-// decoded bytes of each, and all other code reads this buffer like stored bytes. If a file also has
-// the uncompressed geometry (a fallback), the fallback is read. So the result does not depend on
-// the libraries that voxdag was built with.
+// KHR_draco_mesh_compression compresses primitives. For each compressed view or primitive, the
+// document gets additional buffers for the decoded bytes. All other code reads these buffers like
+// stored bytes. If a file also has the uncompressed geometry (a fallback), the fallback is read. So
+// the result does not depend on the libraries that voxdag was built with.
 #pragma once
 
 #include <cstdint>
@@ -83,10 +83,10 @@ struct DracoPart {
 // name. Returns nullopt if `extensions` has none.
 std::optional<std::pair<JsonElement, const char*>> find_meshopt(const JsonElement& extensions);
 
-// read_meshopt() reads the meshopt extension of a buffer view from the view's `extensions`; null if
-// they have no such extension. read_draco() reads the Draco extension of a primitive. Both throw
-// Violation for a member that is missing or of a wrong type, or for a layout that the extension
-// does not allow.
+// read_meshopt() reads the meshopt extension of a buffer view from the view's `extensions`. It
+// returns null if they have no such extension. read_draco() reads the Draco extension of a
+// primitive. Both throw Violation for a member that is missing or of a wrong type, or for a layout
+// that the extension does not allow.
 std::shared_ptr<const MeshoptView> read_meshopt(const JsonElement& extensions);
 std::shared_ptr<const DracoExtension> read_draco(const JsonElement& extension);
 
@@ -99,8 +99,8 @@ void place_meshopt_views(Document& document);
 // accessors are checked. Throws Error{kInvalidInput}.
 void place_draco_primitive(Document& document, Primitive& primitive, const std::string& where);
 // If place_draco_primitive() added a buffer for this primitive, adds another one for the decoded
-// texture coordinates and colors of its PrimitiveSurface, and replaces these accessors likewise.
-// `set` is the n of the surface's TEXCOORD_n, if it has one.
+// texture coordinates and colors of its PrimitiveSurface. Replaces the accessors of these values by
+// copies that refer to this buffer. `set` is the n of the surface's TEXCOORD_n, if it has one.
 void place_draco_surface(Document& document, Primitive& primitive, int set);
 // Checks a view whose buffer one of the functions above added. `where` names the view. Throws
 // Error{kInvalidInput} if the compressed bytes do not exist, if the view does not fit the decoded

@@ -125,7 +125,8 @@ struct Primitive {
   std::vector<int> texture_coordinates;  // TEXCOORD_n
   PrimitiveSurface surface;
   std::shared_ptr<const DracoExtension> draco;  // null: not compressed
-  // Triangles of a strip or fan that can have restarts, set by index_restarts(); otherwise null.
+  // Positions of the triangles of a strip or fan that can have restarts. Set by index_restarts().
+  // Null for all other primitives.
   std::shared_ptr<const RestartIndex> restarts;
 
   bool makes_triangles() const { return mode >= kTriangleList && position >= 0; }

@@ -175,7 +175,8 @@ std::string unescape(const ReadableFile& file, const RawString& uri) {
 }
 
 // True if the data contain escapes, blanks or other characters that are not base64. Then the
-// position of a character does not give the position of its byte, so all must be decoded together.
+// position of a character does not give the position of its byte, so all characters must be decoded
+// together.
 bool is_irregular(const ReadableFile& file, FileRange base64, const RawString& uri) {
   if (uri.is_escaped) return true;
   std::array<char, size_t{16} << 10> window;

@@ -13,9 +13,9 @@ namespace voxdag::gltf {
 
 Asset read_asset(const JsonElement& element);
 std::string read_string(const JsonElement& element);
-// Reads a buffer. Decodes its data: URI into memory, unless the URI is base64 without JSON escapes,
-// blanks and other irregular characters: parts of such base64 can be decoded from the file when
-// they are needed. Throws Error{kOutOfMemory} if the URI does not fit the budget.
+// Reads a buffer. Parts of a data: URI can be decoded from the file later, when they are needed, if
+// the URI is base64 and has no JSON escapes, blanks or other irregular characters. Any other data:
+// URI is decoded into memory here. Throws Error{kOutOfMemory} if the URI does not fit the budget.
 BufferSource read_buffer(const JsonElement& element, const ReadableFile& scene_file,
                          MemoryBudget& budget);
 BufferView read_view(const JsonElement& element);

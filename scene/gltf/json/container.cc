@@ -65,9 +65,9 @@ Chunk read_chunk(const ReadableFile& file, uint64_t offset, uint64_t end) {
   return {read_u32(file, offset + 4), {begin, length}};
 }
 
-// Returns the offset of the chunk that follows a chunk which ends at `end_of_chunk`: usually
-// `end_of_chunk`. Some programs do not count a chunk's padding in its length. So if the chunk BIN
-// begins only at the next multiple of four, returns that multiple.
+// Returns the offset of the next chunk after a chunk that ends at `end_of_chunk`. This offset is
+// usually `end_of_chunk` itself. But some programs do not count a chunk's padding in its length. So
+// if the chunk BIN begins only at the next multiple of four, returns that multiple.
 uint64_t next_chunk(const ReadableFile& file, uint64_t end_of_chunk, uint64_t end) {
   const auto is_bin = [&](uint64_t at) {
     return at + kChunkHeaderBytes <= end && read_u32(file, at + 4) == kBinChunk;

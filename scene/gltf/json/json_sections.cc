@@ -223,7 +223,7 @@ class SectionParser : public nlohmann::json_sax<Json> {
   bool in_section_ = false;  // inside the array of *section_
   int64_t index_ = 0;        // index of the element within its section
 
-  uint64_t depth_ = 0;  // open objects and arrays of the element that contain the next value
+  uint64_t depth_ = 0;  // number of open objects and arrays of the element
   Json element_;
   std::vector<Json*> open_;   // the depth_ open objects and arrays within element_
   ElementTextWriter writer_;  // used instead of element_ if the section is read as text

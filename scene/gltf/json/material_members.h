@@ -17,7 +17,7 @@ using ReportMember = std::function<void(const std::string& name, const std::stri
 
 // Returns the JSON text of the element without the members that break a rule of glTF. Reports each
 // of these members, and each required member that is missing. For an element that is not an object,
-// returns {}.
+// reports it and returns the text "{}".
 std::string without_broken_members(MaterialSection section, const ElementText& element,
                                    const ReportMember& report);
 

@@ -45,12 +45,12 @@ class BufferReader {
                ExternalFiles& external_files, DecodedBuffers& decoded, MemoryBudget& budget,
                unsigned readers);
 
-  // Checks the length of every buffer that triangles use. Throws Error{kInvalidInput} if it has
-  // fewer bytes than declared, Error{kNotFound} if an external file does not exist.
+  // Checks the length of every buffer that triangles use. Throws Error{kInvalidInput} if a buffer
+  // has fewer bytes than declared, Error{kNotFound} if an external file does not exist.
   void check_lengths();
 
-  // Returns bytes [offset, offset + size) of a buffer, which must contain them; at most
-  // kWindowBytes. Valid until the next call.
+  // Returns bytes [offset, offset + size) of a buffer, which must contain them. `size` is at most
+  // kWindowBytes. The result is valid until the next call.
   std::span<const std::byte> window(int buffer, uint64_t offset, size_t size);
 
   // Checks one buffer like check_lengths().

@@ -18,7 +18,7 @@ void CornerReader::read(uint64_t first, size_t count, uint32_t* corners) {
   if (mode_ == kTriangleList) return read_indices(3 * first, 3 * count, corners);
   row_.resize(count + 2);
   read_indices(first, count + 2, row_.data());
-  // The first vertex of a fan belongs to each of its triangles, but may not be in row_.
+  // The first vertex of a fan is in each of its triangles, but in row_ only if `first` is 0.
   uint32_t hub = row_[0];
   if (mode_ == kTriangleFan) read_indices(0, 1, &hub);
   for (size_t i = 0; i < count; ++i) {

@@ -1,6 +1,6 @@
 // Reads the triangles of a primitive as three vertex indices each, from triangle lists, strips and
-// fans, indexed or not. Does not correct the winding of strips without restarts, because
-// SurfaceTriangle::is_flipped marks every second triangle. Not thread-safe.
+// fans, indexed or not. Does not correct the winding of strips without restarts. Instead,
+// SurfaceTriangle::is_flipped marks every second triangle of such a strip. Not thread-safe.
 #pragma once
 
 #include <cstddef>

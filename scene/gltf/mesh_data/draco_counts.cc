@@ -16,8 +16,9 @@ namespace {
 // Number of bytes that read_header() reads first. A header without metadata is not larger.
 constexpr uint64_t kCountedHeaderBytes = 64;
 
-// Maximum number of faces per document that are decoded only to check a number of vertices that the
-// Draco header does not contradict. More faces would take a noticeable time.
+// Maximum number of faces per document that are decoded to check numbers of vertices. Such a check
+// is needed if the Draco header neither confirms nor contradicts the number. Decoding more faces
+// would take a noticeable time.
 constexpr uint64_t kMaxCheckedFaces = 4096;
 
 // Reads up to `size` bytes of the compressed data.
@@ -54,8 +55,8 @@ bool contradicts(const DracoHeader& header, uint64_t vertices) {
   return vertices < header.vertices || vertices > 3 * header.faces;
 }
 
-// True if a strip with this number of faces may declare part.corners. The strip also counts the
-// degenerate triangles that join its pieces, but these are not faces.
+// True if a strip with this number of faces can declare part.corners corners. The strip also counts
+// the degenerate triangles that join its pieces, but these triangles are not faces.
 bool fits_strip(const DracoPart& part, uint64_t faces) {
   const uint64_t triangles = part.corners / 3;
   return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;

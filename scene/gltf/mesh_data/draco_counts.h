@@ -10,7 +10,8 @@ namespace voxdag::gltf {
 // Compares the counts of all Draco primitives that have no fallback with the headers of their data.
 // If they differ, replaces the primitive's counts, with a warning. Skips data that cannot be read:
 // the decoder will report them. Call it before place_draco_surface(). Throws Error{kInvalidInput}
-// if a morph target or a joint set then has another number of elements than the positions.
+// if the number of elements of a morph target or a joint set then differs from the number of
+// positions.
 void correct_draco_counts(Document& document, BufferReader& buffers);
 
 }  // namespace voxdag::gltf

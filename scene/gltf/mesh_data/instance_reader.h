@@ -16,7 +16,7 @@ class InstanceReader {
 
   uint64_t count() const { return count_; }
   // Returns the transform of an instance relative to the node: it scales first, then rotates, then
-  // translates. Reads a window of instances if the last window does not contain this one, so
+  // translates. Reads a window of instances if the last window does not contain this instance. So
   // calls in the order of the instances are fast.
   Transform at(uint64_t instance);
 

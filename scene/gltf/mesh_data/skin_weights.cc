@@ -12,7 +12,7 @@ namespace {
 
 constexpr uint64_t kWeightWindow = 1024;
 
-// Numbers of vertices.
+// Numbers of vertices whose weights are missing or are not normalized.
 struct Faults {
   uint64_t without_weights = 0;
   uint64_t not_normalized = 0;

@@ -55,13 +55,14 @@ inline bool next_corner(std::string_view& arguments, Corner& out) {
 // Facts about the corners of a face, which the first pass over the file collects.
 struct FaceCorners {
   size_t count = 0;  // number of corners
-  // True if a corner has no texture coordinates, or an index before the first.
+  // True if a corner has no texture coordinates, or an index before the first vt statement.
   bool lacks_texture = false;
   int64_t max_texture = 0;  // the largest index of texture coordinates, which counts from 1
 };
 
-// `texcoords`: the number of vt statements before the face. A word that is not a corner is counted
-// as a corner without texture coordinates.
+// Counts the corners of an f statement with these arguments, and collects facts about them.
+// `texcoords` is the number of vt statements before the face. A word that is not a corner is
+// counted as a corner without texture coordinates.
 inline FaceCorners scan_corners(std::string_view arguments, uint64_t texcoords) {
   FaceCorners out;
   for (; has_word(arguments); ++out.count) {

@@ -223,8 +223,8 @@ void ObjFile::count_faces_without_texture(MemoryBudget& budget, const CancelToke
   });
 }
 
-// Sets has_splits of each block of faces (block_index.h) that has a face which cannot be
-// triangulated as a fan around its first corner. Warns about faces whose edges cross.
+// Sets has_splits of each block of faces (block_index.h) in which some face cannot be triangulated
+// as a fan around its first corner. Warns about faces whose edges cross.
 void ObjFile::find_splits(MemoryBudget& budget, const CancelToken& cancel) {
   PolygonReader polygons(*this, budget);
   Positions vertices(*this, budget);

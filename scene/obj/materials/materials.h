@@ -18,8 +18,9 @@ struct ObjMaterials {
   // The appearance of faces with one of the names in ObjFile::materials().
   struct Use {
     uint32_t material = 0;  // index into SceneMaterials::materials
-    // If the material has an image: the same material without image, for triangles without texture
-    // coordinates, and the scale and offset of the texture coordinates (ImageMap).
+    // True if the material has an image. Only then are the members below used. `without_image` is
+    // the index of the same material without the image, for triangles without texture coordinates.
+    // `scale` and `offset` transform the texture coordinates (ImageMap).
     bool has_image = false;
     uint32_t without_image = 0;
     std::array<double, 2> scale{1, 1}, offset{0, 0};

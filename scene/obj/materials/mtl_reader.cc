@@ -90,7 +90,7 @@ class LibraryReader {
     material.is_dissolved = read_opacity(keyword, arguments, material);
   }
 
-  // A statement d takes precedence.
+  // Reads Tr, which is 1 - opacity. Ignores it if the material has a valid statement d.
   void read_transparency(std::string_view keyword, std::string_view arguments,
                          LibraryMaterial& material) {
     if (!material.is_dissolved && read_opacity(keyword, arguments, material))

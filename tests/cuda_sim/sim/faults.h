@@ -16,8 +16,8 @@ struct Fault {
   Call call = Call::kOther;
   uint64_t skipped = 0;  // number of calls of this kind that succeed before the failure
   cudaError_t status = cudaErrorLaunchFailure;
-  // True if all later calls also fail, until the next plan. If `call` is kAllocation or kRelease,
-  // only later allocations fail.
+  // True if calls after the failed call also fail, until the next plan: all calls if `call` is
+  // kOther, otherwise only allocations.
   bool sticky = false;
 };
 

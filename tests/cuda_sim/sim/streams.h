@@ -41,8 +41,8 @@ void queue(cudaStream_t stream, CUstream_st::Operation operation);
 // since the stream was created.
 void run_until(cudaStream_t stream, uint64_t position);
 void run_everything();
-// At random, runs some of the queued operations of all streams. Does nothing if the schedule is
-// late.
+// At random, runs some of the queued operations of all streams. Does nothing if Schedule::late is
+// true.
 void run_some();
 // True if a queued operation will read or write a part of this range of host memory.
 bool is_in_use(const void* memory, size_t bytes);

@@ -22,7 +22,8 @@ struct KernelLaunch {
 void run_kernel(const KernelLaunch& launch);
 
 // The simulated thread that runs on this host thread. `running` is true only while code of the
-// kernel runs. Numbers of threads are unique over all launches.
+// kernel runs. The threads of all launches have different numbers, until the numbers would exceed
+// 32 bits and begin at 1 again.
 struct RunningThread {
   bool running = false;
   uint32_t block = 0, thread = 0;

@@ -27,7 +27,6 @@ inline std::map<std::string, std::string> compressed_scenes() {
         Input{"draco_sequential_quantized", 3, true, draco::MESH_SEQUENTIAL_ENCODING, 8},
         Input{"draco_edgebreaker", 4, false, draco::MESH_EDGEBREAKER_ENCODING, 0},
         Input{"draco_edgebreaker_quantized", 4, true, draco::MESH_EDGEBREAKER_ENCODING, 10},
-        // With over 40 faces per attribute, the encoder uses its other traversal.
         Input{"draco_edgebreaker_many", 12, true, draco::MESH_EDGEBREAKER_ENCODING, 6}}) {
     files[std::string(name) + ".glb"] =
         compressed_scene_of(encode_draco(*bumpy_grid(edge, with_normals), method, bits)).glb();

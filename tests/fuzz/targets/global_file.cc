@@ -169,8 +169,8 @@ void encode_tiles(const voxdag_reader::File& file) {
   }
 }
 
-// Requests tiles and color pages with arbitrary words of the file as addresses. An address may not
-// lead to a node, even in a valid file, so errors about corruption are allowed.
+// Requests tiles and color pages with arbitrary words of the file as addresses. Even in a valid
+// file, such an address often does not lead to a node, so errors about corruption are allowed.
 void answer_strangers(const voxdag_reader::File& file) {
   const query::DagView view(file);
   const CheckedBlocks blocks(file);

@@ -30,7 +30,7 @@ namespace voxdag {
 namespace {
 
 constexpr size_t kMaxPlainBytes = size_t{1} << 20;
-constexpr uint64_t kMaxBlocks = 64;  // of a complete package
+constexpr uint64_t kMaxBlocks = 64;  // maximum number of blocks of a complete package
 
 void read_index(std::string_view text) {
   const query::PackageIndex index = query::parse_index(text, "package.json");
@@ -86,8 +86,8 @@ std::string take_section(std::string_view& bytes) {
   return section;
 }
 
-// Compresses the other sections as the blocks of one pack, and writes their sizes to `page`, the
-// plain page of the directory.
+// Takes the next `blocks` sections and compresses them as the blocks of one pack. Writes the sizes
+// of these blocks to `page`, the plain page of the directory.
 std::string make_pack(query::PackageIndex& index, uint64_t blocks, std::string_view sections,
                       std::string& page) {
   std::string pack;

@@ -74,8 +74,8 @@ class Filler {
     return empty;
   }
 
-  // Decides about all empty voxels of a cube: descends to the maximal empty cubes, which are
-  // decided as one unit, and to the blocks that contain shell voxels.
+  // Decides about all empty voxels of a cube. Descends to the maximal empty cubes, each of which is
+  // one unit, and to the blocks that contain shell voxels.
   void visit_cube(const Cell& low, int edge) {
     if (is_empty_cube(low, edge)) return decide_cube(low, edge);
     if (edge == block_) return decide_block(low);
@@ -159,8 +159,10 @@ class Filler {
     return known->second = sum;
   }
 
-  // Returns view() for a component that touches no corner of the block: view() of the block's low
-  // corner, changed by the crossings on a path along z, y and x to the center of the voxel `first`.
+  // Returns the sum of views for a blind component: a component that contains no voxel at a corner
+  // of its block. Starts with view() of the block's low corner, `low`, and follows a path along z,
+  // y and x to the center of the component's voxel `first`. For kWinding, each crossing on the path
+  // adds 6 times its sign to the sum. For kParity, each crossing replaces the sum s by 6 - s.
   int view_of_blind(const Cell& low, const Cell& first) {
     Point p = {low[0] * kUnits, low[1] * kUnits, low[2] * kUnits};
     int change = 0, crossings = 0;

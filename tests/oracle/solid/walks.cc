@@ -20,8 +20,8 @@ void for_each_voxel(const Place& cube, int radius, int edge, Visit visit) {
         if (in_grid(z)) visit(x, y, z);
 }
 
-// The positions of a cube of radius + 1 voxels per edge: all that touch the grid, and those around
-// them. The cube is given by its voxel with the lowest coordinates.
+// All positions at which a cube of radius + 1 voxels per edge overlaps the grid, and one more
+// position on each side. A position is the cube's voxel with the lowest coordinates.
 struct Walks {
   const Voxels& shell;
   int radius;
@@ -49,7 +49,8 @@ struct Walks {
         }
     return free;
   }
-  // Returns the voxels that none of the positions for which is_open() is true covers.
+  // Returns the voxels that no cube at an open position covers. A position is open if is_open() is
+  // true for it.
   template <class IsOpen>
   Voxels uncovered(const IsOpen& is_open) const {
     Voxels covered(edge), out(edge);

@@ -17,10 +17,11 @@ struct SeededSolid {
   Voxels voxels;
   bool is_enclosed = false;  // the walk does not leave the grid
 };
-// Returns the voxels of a solid whose cube starts with its voxel radius / 2 (rounded down, along
-// each axis) at `seed`. A voxel is set if every cube that contains it is not empty, or is reached
-// by this walk. If the walk leaves the grid, no cube counts as reached. Returns nullopt if the cube
-// is not empty at the start.
+// Computes the solid that a walk of an empty cube of radius + 1 voxels per edge finds. At the start
+// of the walk, the voxel `seed` has the coordinates radius / 2 (rounded down) relative to the
+// cube's low corner. The solid consists of all voxels that no empty cube outside the walk contains.
+// If the walk leaves the grid, the result is computed as if the walk had no cubes. Returns nullopt
+// if the cube is not empty at the start.
 std::optional<SeededSolid> enclose_seed(const Voxels& shell, int radius,
                                         const std::array<int, 3>& seed);
 

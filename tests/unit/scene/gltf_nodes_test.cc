@@ -220,8 +220,7 @@ TEST(GltfNodes, HiddenNodes) {
   EXPECT_THROW(corners_of(scene), Error);
 }
 
-// A hidden joint still moves the vertices of the skin. Meshes of hidden nodes may be broken,
-// because they are not read.
+// Meshes of hidden nodes may be broken, because they are not read.
 TEST(GltfNodes, HiddenNodesAreNotChecked) {
   SceneBuilder scene = corner_scene();
   scene.add_root({{"mesh", 0}});

@@ -65,7 +65,7 @@ TEST(Surfaces, TextureTransform) {
       {"KHR_texture_transform",
        {{"offset", {0, 1}}, {"rotation", 1.57079632679}, {"scale", {0.5, 0.5}}}}};
   OpenScene open(scene.glb());
-  const auto corner = surfaces_of(*open.source).at(0).corners[1].texture;  // of (1, 0)
+  const auto corner = surfaces_of(*open.source).at(0).corners[1].texture;  // of the corner (1, 0)
   EXPECT_NEAR(std::ldexp(static_cast<double>(corner[0]), -kTextureBits), 0, 1e-6);
   EXPECT_NEAR(std::ldexp(static_cast<double>(corner[1]), -kTextureBits), 0.5, 1e-6);
 }

@@ -126,7 +126,7 @@ TEST_F(Import, Binary3ds) {
   import("a.3ds", max_3ds());
   EXPECT_EQ(material().factor, (std::array<uint16_t, 4>{65535, 0, 0, 65535}));
   EXPECT_EQ(material().name, "red");
-  // The z axis of 3DS files points upward, in glTF the y axis, so (x y z) becomes (x z -y).
+  // The z axis points upward in 3DS files, and the y axis in glTF. So (x y z) becomes (x z -y).
   EXPECT_EQ(triangles(), std::vector<Corners>({{{{0, 0, 0}, {1, 0, 0}, {0, 0, -1}}}}));
 }
 

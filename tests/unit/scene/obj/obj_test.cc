@@ -295,7 +295,8 @@ uint64_t count_without_texture(const std::string& faces) {
   return 0;
 }
 
-// kTriangleLines has three vt statements.
+// Counts the faces that have a corner without texture coordinates, or a corner whose index refers
+// to no vt statement. kTriangleLines has three vt statements.
 TEST(Obj, FacesWithoutTextureAreCounted) {
   EXPECT_EQ(count_without_texture("f 1/1 2/2 3/3\nf 1/-3 2/-2 3/-1\n"), 0u);
   EXPECT_EQ(count_without_texture("f 1/4 2/2 3/3\nvt 0 0\n"), 0u);
