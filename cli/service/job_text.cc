@@ -30,6 +30,13 @@ std::string job_title(const Json& job) {
   return printable_line(title);
 }
 
+std::string labels_text(const Json& job) {
+  std::string text;
+  for (const Json& label : job.at("labels"))
+    text += "  #" + printable_line(label.get<std::string>());
+  return text;
+}
+
 std::string state_line(const Json& job) {
   const std::string state = job.at("state");
   std::string line =

@@ -13,6 +13,8 @@ using client::Json;
 std::string state_line(const Json& job);
 // Returns the job's name, or its scenes if it has no name.
 std::string job_title(const Json& job);
+// Returns the job's labels, each with "  #" before it, or "" if it has none.
+std::string labels_text(const Json& job);
 // Returns the progress of a job as text, such as "build 32 %, 31.4 s left". For a succeeded job,
 // returns the size of the result, such as "118 MiB".
 std::string progress_text(const Json& job);

@@ -3,6 +3,7 @@
 #include "cli/output.h"
 #include "cli/service/job_text.h"
 #include "cli/service/service_options.h"
+#include "core/base/text/percent.h"
 #include "core/base/text/printable.h"
 
 namespace voxdag::cli {
@@ -10,7 +11,7 @@ namespace {
 
 struct JobsCommand {
   ServiceOptions service;
-  std::string states;
+  std::string states, label, words;
   unsigned limit = 50;
   bool json = false;
 };
@@ -18,10 +19,11 @@ struct JobsCommand {
 void print(const Json& answer) {
   std::printf("%-16s  %-10s  %10s  %-28s  %s\n", "ID", "STATE", "RESOLUTION", "PROGRESS", "NAME");
   for (const Json& job : answer.at("jobs"))
-    std::printf(
-        "%-16s  %-10s  %10s  %-28s  %s\n", printable_line(job.at("id").get<std::string>()).c_str(),
-        printable_line(job.at("state").get<std::string>()).c_str(),
-        job.at("resolution").dump().c_str(), progress_text(job).c_str(), job_title(job).c_str());
+    std::printf("%-16s  %-10s  %10s  %-28s  %s\n",
+                printable_line(job.at("id").get<std::string>()).c_str(),
+                printable_line(job.at("state").get<std::string>()).c_str(),
+                job.at("resolution").dump().c_str(), progress_text(job).c_str(),
+                (job_title(job) + labels_text(job)).c_str());
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 
@@ -32,6 +34,8 @@ Json get_jobs(const JobsCommand& command, ServiceClient& service) {
   const auto page = [&](size_t limit, const std::string& cursor) {
     std::string path = "/api/v1/jobs?limit=" + std::to_string(limit) + cursor;
     if (!command.states.empty()) path += "&state=" + command.states;
+    if (!command.label.empty()) path += "&label=" + percent_encoded(command.label);
+    if (!command.words.empty()) path += "&q=" + percent_encoded(command.words);
     return service.get(path);
   };
   Json answer = page(command.limit, "");
@@ -69,6 +73,10 @@ void declare(Command& command, JobsCommand& state) {
           "only these states, comma-separated: queued, running, suspended, canceling, canceled, "
           "failed, succeeded")
       .check(check_states);
+  command.option("--label", state.label, "only jobs that have exactly this label");
+  command.option("--find", state.words,
+                 "only jobs whose name, scenes or labels contain this text, or whose id begins "
+                 "with it");
   command.option("--limit", state.limit, "maximum number of jobs, 1 to 200 (default 50)");
   command.json_flag(state.json, "one JSON object on standard output");
 }

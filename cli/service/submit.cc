@@ -33,8 +33,18 @@ std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSyst
   return names;
 }
 
+// Throws before the upload if the server would refuse the labels.
+void check_labels(const std::vector<std::string>& labels) {
+  if (labels.empty() || fits(server::kLabelsField, labels)) return;
+  throw Error(ErrorCode::kInvalidInput,
+              "--label: " + std::to_string(labels.size()) +
+                  (labels.size() == 1 ? " item" : " items") + ": expected " +
+                  expectation<std::vector<std::string>>(server::kLabelsField));
+}
+
 void run(const SubmitCommand& command, ServiceClient& service, CommandContext& context) {
   server::JobRequest request = command.request;
+  check_labels(request.labels);
   request.scenes = upload(request.scenes, context.files, service, command.quiet);
   const Json body = options_json(request);
   // Idempotency key: if the answer is lost and the request is sent again, the server creates no

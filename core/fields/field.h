@@ -50,7 +50,7 @@ struct Field {
   const char* name;
   const char* help = "";
   const char* heading = "";       // heading of the option's group in --help
-  const char* shorthand = "";     // short option of the command line: "-r"
+  const char* shorthand = "";     // another name of the option: "-r"
   const char* default_text = "";  // description of a default that is not a value: "half the RAM"
   const char* parts = "";         // names of an array's numbers: "X,Y,Z,EDGE"
   const char* excluded = "";      // another field that must not be given together with this one

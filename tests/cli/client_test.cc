@@ -101,6 +101,40 @@ TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   EXPECT_NE(watched.out.find(report["sha256"].get<std::string>()), std::string::npos);
 }
 
+// `submit --label` labels a job, and `jobs` finds jobs by a label or by a part of it. Invalid
+// labels are refused before the upload.
+TEST_F(Client, LabelsAndFindsJobs) {
+  const std::string night = "night run \xc3\xa9 100% &label=b";
+  const Json first =
+      run_json({"submit", "m.glb", "-r", "16", "--name", "one", "--label", night, "--label", "b"});
+  const Json second = run_json({"submit", "m.glb", "-r", "16", "--name", "two", "--labels", "b"});
+  EXPECT_EQ(first["labels"], Json({night, "b"}));
+  EXPECT_EQ(second["labels"], Json({"b"}));
+  const auto found = [&](const char* option, const std::string& text) {
+    std::string names;
+    const Json answer = run_json({"jobs", option, text});
+    for (const Json& job : answer["jobs"]) names += job["name"].get<std::string>() + " ";
+    return names;
+  };
+  EXPECT_EQ(found("--label", night), "one ");
+  EXPECT_EQ(found("--label", "b"), "two one ");
+  EXPECT_EQ(found("--label", "night"), "");
+  EXPECT_EQ(found("--find", "RUN"), "one ");
+  EXPECT_EQ(found("--find", second["id"].get<std::string>().substr(0, 9)), "two ");
+  const Answer listed = run({"jobs", "--label", night});
+  EXPECT_NE(listed.out.find("one  #" + night + "  #b"), std::string::npos) << listed.out;
+
+  const double uploaded = metric("voxdag_uploaded_bytes_total");
+  ASSERT_EQ(run({"generate", "soup", "other.glb", "--triangles", "10"}).status, 0);
+  for (const std::string& label : {std::string(65, 'x'), std::string("a\nb"), std::string()})
+    expect_error(2, "--label: 1 item: expected 1 to 16 items, each 1 to 64 characters",
+                 {"submit", "other.glb", "-r", "16", "--label", label});
+  std::vector<std::string> many = {"submit", "other.glb", "-r", "16"};
+  for (int i = 0; i < 17; ++i) many.insert(many.end(), {"--label", std::to_string(i)});
+  expect_error(2, "--label: 17 items", many);
+  EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), uploaded);
+}
+
 // A file is uploaded only once. If the server has a part of the file, only the remaining part is
 // sent.
 TEST_F(Client, UploadsTheMissingPart) {

@@ -19,6 +19,10 @@ struct JobRequest {
   std::string text;                 // JSON with the submitted scene, resolution, options and labels
 };
 
+inline constexpr Field kLabelsField = Field("labels", "texts to find the job by")
+                                          .line(64)
+                                          .items(16)
+                                          .with(&Field::shorthand, "--label");
 inline constexpr Field kPriorityField = Field("priority", "higher runs earlier").range(-100, 100);
 
 template <class Visitor>
@@ -26,7 +30,7 @@ void fields(Visitor& visit, JobRequest& request) {
   visit(kSceneField.line(4096).items(64), request.scenes);
   visit(kResolutionField, request.spec.geometry.resolution);
   visit(Field("name", "name of the job, for people").line(200).omit_empty(), request.name);
-  visit(Field("labels", "texts to find the job by").line(64).items(16), request.labels);
+  visit(kLabelsField, request.labels);
   visit(kPriorityField, request.priority);
   visit.object("options", [&](auto& options) { visit_job_options(options, request.spec); });
 }

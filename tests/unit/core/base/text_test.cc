@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
+#include "core/base/text/percent.h"
 
 namespace voxdag {
 namespace {
@@ -28,6 +29,7 @@ TEST(Text, DecodesPercentEscapes) {
   EXPECT_EQ(percent_decoded(""), "");
   EXPECT_EQ(percent_decoded("a%20b%2Fc%2f%C3%A9"), "a b/c/\xc3\xa9");
   EXPECT_EQ(percent_decoded("%00"), std::string(1, '\0'));
+  EXPECT_EQ(percent_encoded("a b/c-._~%&\xc3\xa9"), "a%20b%2fc-._~%25%26%c3%a9");
   for (const char* text : {"%", "a%2", "%2g", "%g2", "%-1", "100%"})
     EXPECT_EQ(percent_decoded(text), std::nullopt) << text;
 }
