@@ -31,18 +31,22 @@ class JobView {
     }
     const Json& stages = progress.at("stages");
     for (; ended_ < stages.size() && stages[ended_].at("ended").get<bool>(); ++ended_)
-      show_stage(stages[ended_], true, average_rate(stages[ended_]), 0);
+      show_stage(stages[ended_], true, average_rate(stages[ended_]), 0, "");
     const double now = wall_seconds();
     if (state_ != "running" || ended_ >= stages.size() || now - shown_s_ < line_.interval_s())
       return;
     shown_s_ = now;
-    show_stage(stages[ended_], false, progress.at("rate"), progress.at("eta_s"));
+    const std::string overall = overall_text(progress, true);
+    show_stage(stages[ended_], false, progress.at("rate"), progress.at("eta_s"),
+               overall.empty() ? "" : "job " + overall);
   }
 
-  void show_stage(const Json& stage, bool ended, double rate, double eta_s) {
+  void show_stage(const Json& stage, bool ended, double rate, double eta_s,
+                  const std::string& overall) {
     const std::string name = stage.at("name"), unit = stage.at("unit");
-    line_.show({name, unit, stage.at("done"), stage.at("total"), stage.at("wall_s"), rate, eta_s},
-               ended);
+    line_.show(
+        {name, unit, stage.at("done"), stage.at("total"), stage.at("wall_s"), rate, eta_s, overall},
+        ended);
   }
 
   static double average_rate(const Json& stage) {

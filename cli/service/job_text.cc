@@ -1,5 +1,6 @@
 #include "cli/service/job_text.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "core/base/text.h"
@@ -7,12 +8,6 @@
 
 namespace voxdag::cli {
 namespace {
-
-std::string percent_text(const Json& progress) {
-  const double total = progress.at("total"), done = progress.at("done");
-  if (total <= 0) return "";
-  return " " + std::to_string(static_cast<int>(100 * std::min(1.0, done / total))) + " %";
-}
 
 std::string error_code(const Json& job) {
   return job.at("error").is_object() ? job.at("error").at("code").get<std::string>() : "";
@@ -48,6 +43,17 @@ std::string state_line(const Json& job) {
   return line;
 }
 
+std::string overall_text(const Json& progress, bool is_running) {
+  const auto overall = progress.find("overall");
+  if (overall == progress.end()) return "";
+  const double fraction = overall->at("fraction");
+  std::string text = std::to_string(static_cast<int>(100 * std::clamp(fraction, 0.0, 1.0))) + " %";
+  const Json& left_s = overall->at("eta_s");
+  if (is_running && left_s.is_number())
+    text += ", " + duration_text(left_s.get<double>()) + " left";
+  return text;
+}
+
 std::string progress_text(const Json& job) {
   const std::string state = job.at("state");
   const Json& progress = job.at("progress");
@@ -56,11 +62,9 @@ std::string progress_text(const Json& job) {
   if (state == "queued" && job.at("position").is_number())
     return "number " + job.at("position").dump();
   if (!progress.is_object()) return "";
-  std::string text =
-      printable_line(progress.at("stage").get<std::string>()) + percent_text(progress);
-  const double left_s = progress.at("eta_s");
-  if (state == "running" && left_s > 0) text += ", " + duration_text(left_s) + " left";
-  return text;
+  const std::string stage = printable_line(progress.at("stage").get<std::string>());
+  const std::string overall = overall_text(progress, state == "running");
+  return overall.empty() ? stage : stage + ": " + overall;
 }
 
 void print_result(const Json& job) {

@@ -97,7 +97,7 @@ class ProgressBar : public Progress {
     const double part = missing > 0 ? std::min(1.0, done_here / missing) : 0;
     const double left = part >= kMinPartForEstimate ? elapsed / part - elapsed : 0;
     const double rate = done_here / elapsed;
-    line_.show({stage_, unit_, done, total_, elapsed, rate, left}, ended);
+    line_.show({stage_, unit_, done, total_, elapsed, rate, left, {}}, ended);
   }
 
   ProgressLine line_;
@@ -134,7 +134,10 @@ void ProgressLine::show(const StageView& stage, bool ended) {
   line += short_count(done) + (stage.total ? " of " + short_count(total) : "");
   line += " " + printable_line(stage.unit) + ", " + short_count(stage.rate) + "/s, " +
           duration_text(stage.elapsed_s);
-  if (!ended && stage.eta_s > 0) line += ", " + duration_text(stage.eta_s) + " left";
+  if (!ended && !stage.overall.empty())
+    line.append(", ").append(stage.overall);
+  else if (!ended && stage.eta_s > 0)
+    line += ", " + duration_text(stage.eta_s) + " left";
   open_ = terminal_ && !ended;
   if (!open_) line += "\n";
   std::fputs(line.c_str(), stderr);

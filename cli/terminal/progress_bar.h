@@ -18,6 +18,8 @@ struct StageView {
   double elapsed_s = 0;
   double rate = 0;   // units per second
   double eta_s = 0;  // 0 if unknown
+  // Text that replaces the stage's remaining time, such as "job 42 %, 31.4 s left"; "" for none.
+  std::string_view overall;
 };
 
 // Shows the progress of a stage as one line on standard error. If standard error is a terminal, the

@@ -144,8 +144,11 @@ bool Dispatcher::start_next_job() {
   const auto job = queue_.next(unix_seconds(), config_.jobs.max_backoff_s, present);
   if (!job) return false;
   uint64_t needed = 0;
+  std::vector<StageShare> stages;
   try {
-    needed = tasks_.memory_of(parse_job_request(job->request));
+    const JobRequest request = parse_job_request(job->request);
+    needed = tasks_.memory_of(request);
+    stages = long_stages(request.spec.geometry);
   } catch (const RequestError& error) {
     // The request cannot be read: another version of this program stored it, or its record is
     // damaged.
@@ -168,7 +171,7 @@ bool Dispatcher::start_next_job() {
   });
   try {
     log_("job " + started.id + " running");
-    start_worker(started.id, std::make_shared<LiveJob>(needed),
+    start_worker(started.id, std::make_shared<LiveJob>(needed, std::move(stages)),
                  [this, started](LiveJob& live) { run_job(started, live); });
   } catch (...) {
     recovered_ = steps_.run("queue job " + started.id + " again", [&] {

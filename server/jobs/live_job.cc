@@ -88,7 +88,7 @@ void LiveJob::apply(const Message& message) {
   if (const auto* resumed = std::get_if<StageResumed>(&message); resumed && !stages_.empty())
     stages_.back().done = stages_.back().resumed_at = resumed->done;
   if (const auto* advanced = std::get_if<StageAdvanced>(&message); advanced && !stages_.empty()) {
-    Stage& stage = stages_.back();
+    StageProgress& stage = stages_.back();
     stage.wall_s = now - stage.start_s;
     stage.ended = false;
     stage.done = advanced->done;
@@ -123,12 +123,9 @@ std::string LiveJob::progress_json() const {
 std::string LiveJob::make_progress() const {
   using nlohmann::ordered_json;
   if (stages_.empty()) return "";
-  const Stage& now = stages_.back();
-  const auto done_here = static_cast<double>(now.done - std::min(now.resumed_at, now.done));
-  const double rate = now.wall_s > 0 ? done_here / now.wall_s : 0;
-  const double left = now.total > now.done ? static_cast<double>(now.total - now.done) : 0;
+  const StageProgress& now = stages_.back();
   ordered_json stages = ordered_json::array();
-  for (const Stage& stage : stages_)
+  for (const StageProgress& stage : stages_)
     stages.push_back({{"name", stage.name},
                       {"unit", stage.unit},
                       {"done", stage.done},
@@ -141,8 +138,9 @@ std::string LiveJob::make_progress() const {
       {"unit", now.unit},
       {"done", now.done},
       {"total", now.total},
-      {"rate", rate},
-      {"eta_s", rate > 0 && !now.ended ? left / rate : 0.0},
+      {"rate", now.rate()},
+      {"eta_s", now.eta_s()},
+      {"overall", make_overall()},
       {"elapsed_s", wall_seconds() - start_s_},
       {"stages", std::move(stages)},
       {"subvolumes", {{"built", subvolumes_.built}, {"total", subvolumes_.total}}},
@@ -154,6 +152,15 @@ std::string LiveJob::make_progress() const {
   };
   if (cluster_tasks_) progress["cluster"] = cluster_json(*cluster_tasks_);
   return json_text(progress);
+}
+
+nlohmann::ordered_json LiveJob::make_overall() const {
+  if (!result_.empty()) return {{"fraction", 1.0}, {"eta_s", 0.0}};
+  const OverallProgress overall = overall_progress(stages_, shares_);
+  fraction_ = std::max(fraction_, overall.fraction);
+  nlohmann::ordered_json json = {{"fraction", fraction_}, {"eta_s", nullptr}};
+  if (overall.eta_s) json["eta_s"] = *overall.eta_s;
+  return json;
 }
 
 void LiveJob::stop() {

@@ -4,18 +4,23 @@
 
 #include <cstdint>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/clock.h"
+#include "server/jobs/overall_progress.h"
 #include "server/jobs/protocol/job_messages.h"
 
 namespace voxdag::server {
 
 class LiveJob {
  public:
-  explicit LiveJob(uint64_t memory_bytes) : memory_bytes_(memory_bytes) {}
+  // `stages` are the long stages of the job's build.
+  explicit LiveJob(uint64_t memory_bytes, std::vector<StageShare> stages = {})
+      : memory_bytes_(memory_bytes), shares_(std::move(stages)) {}
 
   // Memory limit of the job's process.
   uint64_t memory_bytes() const { return memory_bytes_; }
@@ -40,13 +45,9 @@ class LiveJob {
   double stop_requested_s() const { return locked(stop_requested_s_); }
 
  private:
-  struct Stage {
-    std::string name, unit;
-    uint64_t done = 0, total = 0, resumed_at = 0;
-    double start_s = 0, wall_s = 0;
-    bool ended = false;
-  };
   std::string make_progress() const;
+  // Returns the member "overall" of PROGRESS. Its fraction never decreases.
+  nlohmann::ordered_json make_overall() const;
   template <class T>
   T locked(const T& value) const {
     std::lock_guard lock(mutex_);
@@ -54,9 +55,10 @@ class LiveJob {
   }
 
   const uint64_t memory_bytes_;
+  const std::vector<StageShare> shares_;
   const double start_s_ = wall_seconds();
   mutable std::mutex mutex_;  // guards all members below
-  std::vector<Stage> stages_;
+  std::vector<StageProgress> stages_;
   SubvolumeTotals subvolumes_;
   Usage usage_;
   std::optional<ClusterTasks> cluster_tasks_;
@@ -66,6 +68,7 @@ class LiveJob {
   uint64_t version_ = 1;
   mutable uint64_t json_version_ = 0;
   mutable std::string json_;
+  mutable double fraction_ = 0;  // the largest fraction reported so far
   double stop_requested_s_ = 0;
 };
 

@@ -63,6 +63,7 @@ TEST_F(Api, TurnsASceneIntoADag) {
   ASSERT_TRUE(until_state(id, "succeeded"));
   const Json done = job(id);
   EXPECT_EQ(done["attempts"], 1);
+  EXPECT_EQ(done["progress"]["overall"], Json({{"fraction", 1.0}, {"eta_s", 0.0}}));
   EXPECT_EQ(done["progress"]["subvolumes"]["built"], done["progress"]["subvolumes"]["total"]);
   EXPECT_EQ(done["result"]["levels"].size(), 8u);
 
