@@ -85,9 +85,11 @@ void RecordCollector::read_record(const ClusterFolder::Entry& entry) {
 
 void RecordCollector::reject(const ClusterFolder::Entry& entry, OpenBatch& batch,
                              const Error& error) {
-  cluster_.progress().warn("the record " + entry.path + " is rejected: " + error.message());
-  // false: the task may still be running, because the record may come from an earlier attempt.
-  if (!batch.error) batch.error = {error.message(), false};
+  const std::string rejection = "the record " + entry.path + " is rejected: " + error.message();
+  cluster_.progress().warn(rejection);
+  // has_ended is false, because the record can come from an earlier attempt while the batch's
+  // present task still runs.
+  if (!batch.error) batch.error = {rejection, false};
   rejected_.insert(entry.path);
   remove_attempt(entry);
 }
