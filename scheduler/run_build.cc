@@ -124,8 +124,8 @@ void plan(BuildJob& job, const PreparedScene& scene) {
   job.start_over = false;
 }
 
-// Accepts subvolumes built by earlier runs, then removes segments that neither the job store nor a
-// FilledParts of the job names.
+// Accepts subvolumes built by earlier runs. Then removes the segments that are named neither by the
+// job store nor by one of the job's FilledParts objects.
 void resume_subvolumes(BuildJob& job, SubvolumeBuilder& builder, const std::string& scene_digest) {
   builder.resume(scene_digest);
   if (!job.spec.run.cluster) {
@@ -154,7 +154,7 @@ void report_artifacts(BuildJob& job) {
     job.report.artifact_nodes += subvolume.summary.dag_nodes;
 }
 
-// For a solid, opens its sample rows (SolidRows) or, if the solid is enclosed, its filled parts
+// Opens the sample rows (SolidRows) of a solid or, with `--solid enclosed`, its filled parts
 // (FilledParts). Loads their state if an earlier run saved it.
 void open_solid(BuildJob& job, const std::string& scene_digest) {
   const GeometryOptions& geometry = job.spec.geometry;

@@ -1,4 +1,4 @@
-// The values of a cell of the color grid that do not follow from its ColorSum.
+// The values of a cell of the color grid (color_grid.h) that cannot be computed from its ColorSum.
 #pragma once
 
 #include <cstdint>

@@ -23,8 +23,8 @@ namespace voxdag {
 // Returns the XXH64 of bytes, with seed 0.
 uint64_t checksum64(std::span<const std::byte> bytes);
 
-// XXH3 with 128 bits, which is several times as fast as SHA-256. Different contents have different
-// checksums for all practical purposes, unless someone forges them.
+// XXH3 with 128 bits, which is several times as fast as SHA-256. Different contents practically
+// always have different checksums, but it is possible to forge contents that have a given checksum.
 struct Checksum128 {
   uint64_t low = 0, high = 0;
   bool operator==(const Checksum128&) const = default;

@@ -2,9 +2,9 @@
 // profiles, gamma and orientation, as glTF requires.
 //
 // Decoders: libpng, libjpeg-turbo with its accurate integer transform and smooth upsampling, and,
-// if voxdag was built with them, libwebp and libavif. WebP and AVIF images are decoded in one
-// piece, in memory that is charged, by the first read_row(). All invalid bytes cause BrokenImage,
-// whatever image size they declare. Not thread-safe.
+// if voxdag was built with them, libwebp and libavif. The first read_row() of a WebP or AVIF image
+// decodes the complete image, in memory that is charged to the budget. All invalid bytes cause
+// BrokenImage, whatever image size they declare. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -27,8 +27,8 @@ class EncodedBytes {
   virtual size_t read(std::span<std::byte> out) = 0;
 };
 
-// Thrown for an image that cannot be decoded. The message completes "<image> ...", for example "is
-// a GIF image, which voxdag does not read: convert it to PNG".
+// Thrown for an image that cannot be decoded. The caller puts the name of the image before the
+// message, for example "is a GIF image, which voxdag does not read: convert it to PNG".
 struct BrokenImage {
   std::string message;
 };

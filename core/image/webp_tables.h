@@ -1,4 +1,4 @@
-// Upper bound of the memory for the decoding tables of a lossless WebP stream. An image may declare
+// Upper bound of the memory for the decoding tables of a lossless WebP stream. An image can declare
 // 65536 sets of tables in a few kilobytes, so the bound is needed before the stream is decoded.
 #pragma once
 

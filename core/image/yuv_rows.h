@@ -24,7 +24,7 @@ struct YuvPlanes {
   bool is_limited = false;        // luma is in 16..235, chroma in 16..240, for 8 bits
   bool is_premultiplied = false;  // colors are multiplied by alpha
   int matrix = 0;                 // MatrixCoefficients of H.273
-  bool halves_width = false, halves_height = false;  // resolution of chroma
+  bool halves_width = false, halves_height = false;  // chroma has half the width, half the height
   std::array<Plane, 3> color{};  // luma and both chromas; gray if the chromas are missing
   Plane alpha{};                 // opaque if missing; always of full range
 };

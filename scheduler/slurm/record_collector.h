@@ -39,7 +39,7 @@ class RecordCollector {
   ClusterContext& cluster_;
   BatchTable& batches_;
   // Paths of records that cannot be read yet or whose segment is not visible yet, each with the
-  // time of the first attempt to read it.
+  // time when this process first tried to read the record.
   std::map<std::string, Seconds> incomplete_since_;
   // Paths of rejected record and failure files. collect() skips them, because some cannot be
   // removed, such as a folder with the name of a record.

@@ -1,7 +1,8 @@
 // The durable state of the stage `enclose`: the artifacts of the parts of the grid that it has
-// filled. They replace the artifacts of the shell in the merge. A filled part depends only on the
-// scene and on the geometry options, so a part that an earlier run has filled remains valid, even
-// if this run divides the grid differently.
+// filled. In the merge, they replace the artifacts of the subvolumes, which have only the shell
+// (the voxels that triangles touch). A filled part depends only on the scene and on the geometry
+// options, so a part that an earlier run has filled remains valid, even if this run divides the
+// grid differently.
 //
 // add_durable() and save() replace the record on the disk atomically (by renaming). Thread-safe,
 // except load(), complete() and forget().

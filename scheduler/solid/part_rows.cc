@@ -14,7 +14,7 @@ class PartEntry {
  public:
   PartEntry(const SolidEntry& whole_entry, const SampleRows& whole, const SampleRows& part)
       : rule_(whole_entry.rule), part_(part) {
-    int first[3];  // the part's position, in blocks
+    int first[3];  // the part's position in the subvolume, in blocks
     for (int a = 0; a < 3; ++a)
       first[a] = static_cast<int>((part.low[a] - whole.low[a]) >> part.pitch_log2);
     for (int a = 0; a < 3; ++a) {

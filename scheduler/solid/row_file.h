@@ -24,7 +24,7 @@ class RowFile {
   RowFile(FileSystem& files, const std::string& path, uint64_t first_byte);
 
   RowExtent append(std::span<const std::byte> bytes);
-  // Compresses and appends.
+  // Compresses `numbers` and appends the compressed bytes.
   RowExtent append_rows(std::span<const int32_t> numbers);
   // Both functions throw Error{kCorrupt} if the bytes are damaged.
   std::vector<std::byte> read(const RowExtent& extent) const;

@@ -27,10 +27,10 @@ std::optional<Seed> seed_of(const GeometryOptions& options, const Grid& grid);
 std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cube,
                                  uint32_t grid_levels);
 
-// Returns the position at which the walking cube of a build with a radius V starts: its voxel with
-// index V / 2 along each axis, rounded down, is the seed's voxel. The position is in the grid of
-// the positions (stages/enclose/cube_walks.h). `grid_levels` are the levels of the grid of the
-// voxels.
+// Returns the position at which the walking cube of a build with a radius V starts
+// (stages/enclose/cube_walks.h). At this position, the voxel that has the index V / 2 (rounded
+// down) along each axis of the walking cube is the seed's voxel. The position is in the grid of the
+// positions. `radius` is V, and `grid_levels` are the levels of the grid of the voxels.
 CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels);
 
 // Throws Error{kInvalidInput}: the seed's voxel, or a voxel of the cube that starts there, is in

@@ -54,7 +54,7 @@ struct FullCube {
 // Numbers of sample rows of the grid.
 struct RowCounts {
   uint64_t rows = 0;  // rows with a crossing
-  uint64_t open = 0;  // rows whose signs do not sum to 0
+  uint64_t open = 0;  // rows with crossings whose signs do not sum to 0
   uint64_t odd = 0;   // rows with an odd number of crossings
 };
 

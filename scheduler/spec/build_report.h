@@ -39,7 +39,7 @@ struct BuildReport {
   OrderName node_order = OrderName::kHash;
   uint64_t bytes = 0;
   MergeReport merge;
-  uint64_t triangles = 0;  // triangles that may touch the grid
+  uint64_t triangles = 0;  // triangles whose bounding boxes touch the grid
   uint64_t dropped_outside = 0;
   uint64_t dropped_invalid = 0;
   uint64_t subvolumes = 0;  // all, including empty and reused ones

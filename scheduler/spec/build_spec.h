@@ -44,7 +44,7 @@ struct GeometryOptions {
   std::optional<std::array<double, 4>> bounds;  // X, Y, Z of the low corner, EDGE
   std::optional<double> voxel_size;
   bool skip_invalid = false;
-  bool thin = false;  // the rule kThin
+  bool thin = false;  // the rule VoxelRule::kThin
   CutoutRule cutouts = CutoutRule::kDefault;
   std::optional<double> point_radius;         // half edge of the cube that replaces each point
   std::string columns;                        // names of the columns of text files with points
@@ -52,7 +52,7 @@ struct GeometryOptions {
   uint32_t hash_bits = 64;
   OrderName order = OrderName::kHash;  // the order of the nodes in each level
   SolidName solid = SolidName::kNone;  // the rule that fills the interior
-  // A point in scene units. If it is set, only its enclosed space is filled.
+  // A point in scene units. If it is set, only the enclosed space around the point is filled.
   std::optional<std::array<double, 3>> seed;
   uint32_t radius = 0;      // enclosed solids: seals gaps of up to this many voxels
   AttributeSet attributes;  // attributes of the color grid's cells

@@ -84,7 +84,7 @@ struct MemoryPlan {
   static constexpr uint64_t kSplitBufferBytes = uint64_t{512} << 10;
 
   uint64_t top_tree_bytes = 0;          // counters of the top tree
-  uint64_t triangle_bytes = 0;          // triangles in memory, from ingest until they are built
+  uint64_t triangle_bytes = 0;          // triangles in memory, until their subvolumes are built
   uint64_t partition_buffer_bytes = 0;  // chunks being filled, all subvolumes together; uncharged
 
   static constexpr MemoryPlan divide(uint64_t budget_bytes) {
@@ -102,8 +102,9 @@ struct MemoryPlan {
   }
   // Returns the maximum size of the sample rows of a solid's planned subvolume.
   static constexpr uint64_t solid_row_bytes(uint64_t budget_bytes) { return budget_bytes / 64; }
-  // Returns the memory for labels of an enclosed solid that are kept until their part is filled. If
-  // little memory is free, no labels are kept, so that the workers can process large parts.
+  // Returns the memory for labels of empty space (SpaceLabels) that the stage `enclose` keeps until
+  // it fills their parts. If little memory is free, no labels are kept, so that the workers can
+  // process large parts.
   static constexpr uint64_t kept_label_bytes(uint64_t free_bytes) {
     return free_bytes < uint64_t{512} << 20 ? 0 : free_bytes / 2;
   }

@@ -129,7 +129,7 @@ void ArtifactCache::mark_used(const std::string& key) {
   try {
     files_.touch(path_of(key));
   } catch (const Error&) {
-    // This process may not write to the cache.
+    // This process has no permission to write to the cache.
   }
 }
 

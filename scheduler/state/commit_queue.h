@@ -3,8 +3,8 @@
 // not wait for the disk. The last group is different:
 //   - With a MemoryStore of triangles, the group is merged before it is durable. Only commit()
 //     makes it durable. A short build does not call commit(), which saves the wait for the disk.
-//   - With a DurableStore, finish() makes the group durable, because the bins of its triangles may
-//     be released only after that.
+//   - With a DurableStore, finish() makes the group durable, because the bins of its triangles must
+//     not be released before that.
 // Not thread-safe.
 #pragma once
 
@@ -78,7 +78,7 @@ class CommitQueue {
   std::future<void> pending_;
 };
 
-// The queues of finished workers. Their last groups may not be durable yet.
+// The queues of finished workers. Their last groups are possibly not durable yet.
 class CommitQueues {
  public:
   void add(std::unique_ptr<CommitQueue> queue) { queues_.push_back(std::move(queue)); }

@@ -42,7 +42,7 @@ bool is_scratch(const DirectoryEntry& entry) {
 bool is_left_by_nfs(std::string_view name) { return name.starts_with(".nfs"); }
 
 // True for a file or folder of a cluster build (slurm/files/cluster_folder.h). Any entry, even a
-// folder or a pipe, may have the name of a record; the build warns about it.
+// folder or a pipe, can have the name of a record; the build warns about it.
 bool is_of_cluster(const DirectoryEntry& entry) {
   const std::string_view name = entry.name;
   if (name.starts_with("batch-") && name.ends_with(".json")) return true;

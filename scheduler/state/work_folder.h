@@ -32,7 +32,7 @@ class WorkFolder {
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
   // Returns the process that has locked the folder, as "process 17 on box"; "" if none has.
   static std::string holder(FileSystem& files, const std::string& folder);
-  // Returns the files in `folder` whose names voxdag uses. A build in this folder may remove or
+  // Returns the files in `folder` whose names voxdag uses. A build in this folder can remove or
   // change them.
   static std::vector<std::string> files_in(FileSystem& files, const std::string& folder);
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }

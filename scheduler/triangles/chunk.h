@@ -1,6 +1,6 @@
 // Stored triangles: records of fixed size in chunks, each chunk in memory or in a TriangleFile.
-// Both triangle stores use these chunks. No function locks: one thread writes a list of chunks, and
-// any number of threads may read the list when it is complete.
+// Both triangle stores use these chunks. The functions take no locks: one thread writes a list of
+// chunks, and any number of threads may read the list when it is complete.
 //
 // A record has nine coordinates of 32 bits (36 bytes). If the build's options give the grid's
 // bounds, triangles may extend far beyond the grid. Their coordinates then have 64 bits ("wide", 72

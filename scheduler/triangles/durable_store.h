@@ -34,7 +34,7 @@ class DurableStore : public TriangleStore {
  public:
   // Opens the store at `path` with its contents at the checkpoint that returned `state`. Throws
   // DamagedTriangles if they are damaged. Parts are kept in a MemoryStore that charges to `share`
-  // and spills to `spill_path`. `wide` as in chunk.h.
+  // and spills to `spill_path`. chunk.h explains `wide`.
   DurableStore(FileSystem& files, std::string path, const DurableStoreState& state,
                std::string spill_path, bool wide, MemoryBudget& share);
 

@@ -18,7 +18,7 @@ namespace voxdag {
 class MemoryStore : public TriangleStore {
  public:
   // Charges chunks to `share`. Chunks that do not fit in `share` are written to a file at
-  // `spill_path`, which the first such chunk creates. `wide` as in chunk.h.
+  // `spill_path`, which the first such chunk creates. chunk.h explains `wide`.
   MemoryStore(FileSystem& files, std::string spill_path, bool wide, MemoryBudget& share);
 
   size_t record_bytes() const override { return record_bytes_; }

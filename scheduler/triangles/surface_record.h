@@ -29,8 +29,8 @@ inline constexpr size_t kMaxSurfaceRecordBytes = 1 + 4 + 9 * 8 + 6 * 8 + 12 * 2;
 void append_surface(const FixedSurface& surface, bool has_image, std::vector<std::byte>& out);
 
 // Appends the data of a snapped triangle that decide which voxels it sets: its positions as a
-// record of `record_bytes` bytes (chunk.h) and, if it may be cut out, the record of its surface.
-// `cutouts` may be null.
+// record of `record_bytes` bytes (chunk.h) and, if the triangle can be cut out, the record of its
+// surface. `cutouts` may be null.
 void append_identity(const FixedSurface& surface, const Cutouts* cutouts, size_t record_bytes,
                      std::vector<std::byte>& out);
 

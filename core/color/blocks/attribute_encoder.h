@@ -14,8 +14,8 @@ namespace voxdag {
 
 class AttributeEncoder {
  public:
-  // `value_bytes` is the result of value_bytes(); it is not used for colors. `levels` is as for
-  // RegionEncoder.
+  // `value_bytes` is the result of value_bytes(); it is not used for colors. `levels` has the same
+  // meaning as in the constructor of RegionEncoder (region.h).
   AttributeEncoder(Attribute attribute, uint32_t value_bytes, uint32_t levels)
       : traits_(traits_of(attribute)),
         value_bytes_(value_bytes),

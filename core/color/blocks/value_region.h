@@ -18,9 +18,10 @@ struct ValuedCell {
   uint32_t value = 0;  // below 256^bytes
 };
 
-// Encodes a region, as encode_region() does for colors, and leaves `total` zero. `bytes`: bytes per
-// value, see value_bytes(). Coarser cells get the attribute's value_of_parent(). Thread-safe.
-// Memory: up to 10 bytes for each cell, in addition to the result.
+// Encodes a region, as encode_region() does for colors, and leaves `total` zero. `bytes` is the
+// number of bytes per value, see value_bytes(). The values of coarser cells are computed by the
+// attribute's value_of_parent(). Thread-safe. Memory: up to 10 bytes for each cell, in addition to
+// the result.
 EncodedRegion encode_values(Attribute attribute, uint32_t bytes, uint32_t levels, uint64_t morton,
                             std::span<const ValuedCell> cells);
 

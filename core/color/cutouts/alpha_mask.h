@@ -44,7 +44,7 @@ class AlphaMask {
  private:
   struct Level {
     uint32_t width, height, row_words;
-    size_t any, all;  // start of the two sets of bits in words_; the finest level has only one set
+    size_t any, all;  // first words of the any and all bits; the finest level shares its bits
   };
 
   bool bit(size_t first, uint32_t level, uint32_t x, uint32_t y) const {

@@ -20,7 +20,7 @@ struct Cutouts {
   const AlphaMask* mask(uint32_t material) const {
     return mask_of[material] == kNoMask ? nullptr : &masks[mask_of[material]];
   }
-  // True if triangles of the material may be cut out, in part or completely.
+  // True if triangles of the material can be cut out, in part or completely.
   bool may_cut(uint32_t material) const {
     return materials[material].alpha_mode != AlphaMode::kOpaque;
   }

@@ -9,9 +9,9 @@
 // covers no texel at all, the triangle is visible in the voxel if the polygon touches a visible
 // texel. All values are computed in IEEE doubles, in the order of the code.
 //
-// For a larger cube, the texels in a box around the cube's polygon, slightly enlarged, are a quick
-// test: if all are visible (or none), the triangle is visible in all of the cube's voxels (or
-// none).
+// A larger cube is first tested quickly, by the texels in a slightly enlarged box around the cube's
+// polygon. If all these texels are visible, the triangle is visible in all voxels of the cube that
+// it touches. If none is visible, the triangle is hidden in all these voxels.
 #pragma once
 
 #include <array>
@@ -41,7 +41,7 @@ class VisiblePart {
 
  private:
   struct Point {
-    double at[3];     // relative to the cube's low corner, in lattice units
+    double at[3];     // relative to the cube's low corner, in lattice units (1/256 voxel)
     double texel[2];  // position in the image, in texels
   };
   struct Polygon {

@@ -123,8 +123,8 @@ bool VisiblePatches::visit_rows(const Voxel& low, const Visit& visit) {
   return is_complete;
 }
 
-// Visits the patches of the first run (of consecutive visible voxels) of a row and of the equal
-// runs in the next rows of the layer. Removes these runs.
+// Takes the first run (of consecutive visible voxels) of a row, and the equal runs in the next rows
+// of the layer. Visits the patches of these runs, and removes the runs from rows_.
 bool VisiblePatches::visit_run(const Voxel& low, size_t row, const Visit& visit) {
   const int first = std::countr_zero(rows_[row]);
   const int count = std::countr_one(rows_[row] >> first);

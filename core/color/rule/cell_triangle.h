@@ -92,10 +92,11 @@ struct CellTriangle {
   bool degenerate;
   double area;  // twice the area in square lattice units: the length of the normal
   // The function of the triangle's plane is normal.x - normal.v, for a point x and any vertex v. It
-  // is 0 on the plane. plane_floor and plane_ceil are its value at the grid's origin, divided by
-  // the cell's edge E = 2^cell_bits and rounded down and up. column_floor and column_ceil are its
-  // value where column (0, 0) of the comment at the top of this file has the coordinate 0 along
-  // axis 2, divided by E/4 and rounded down and up.
+  // is 0 on the plane. plane_floor and plane_ceil are the function's value at the grid's origin,
+  // divided by the cell's edge E = 2^cell_bits and rounded down and up. column_floor and
+  // column_ceil are its value at the point of column (0, 0) with the coordinate 0 along axis 2,
+  // divided by E/4 and rounded down and up. The comment at the top of this file defines column (0,
+  // 0).
   Int plane_floor, plane_ceil, column_floor, column_ceil;
   // edges[d][i] is the edge from vertex i to i + 1 in the projection along axis d. In its function,
   // x and y are along the axes d + 1 and d + 2. (All sums are modulo 3.)

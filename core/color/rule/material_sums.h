@@ -104,7 +104,7 @@ class MaterialSums {
 
   std::vector<FirstMaterial> materials_;
   std::vector<FurtherMaterial> further_;
-  size_t max_further_ = kFewFurther;  // length of the list at which its weights are added up
+  size_t max_further_ = kFewFurther;  // length of further_ at which add_up() is called next
 };
 
 }  // namespace voxdag::color

@@ -1,4 +1,5 @@
-// The cells of a region that surfaces touch, and their sums, found by Morton code in the region.
+// The cells that surfaces touch in a region, and the sums of these cells. Cells are found by their
+// Morton codes in the region.
 //
 // A cell is covered if a surface covers one of its columns (cell_triangle.h). In a covered cell,
 // surfaces that cover no column are ignored. Whether a cell is covered is known only at the end. So

@@ -10,15 +10,15 @@
 
 namespace voxdag::color {
 
-// The integer that stands for the cross section of one column, which is 1/16 of a cell's face, in
-// the components of SurfaceFacing::area.
+// The integer that stands for the area of one column's cross section in the components of
+// SurfaceFacing::area. The cross section is 1/16 of a cell's face.
 inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.
 struct SurfaceFacing {
   // A vector along the triangle's normal. Its length is the area of the triangle's part in one
-  // covered column, so the magnitude of its dominant component, the area of the part's projection,
-  // is kColumnArea. All 0 for a triangle without area.
+  // covered column. Its dominant component is the area of this part's projection along the column,
+  // so the component's magnitude is kColumnArea. All components are 0 for a triangle without area.
   int64_t area[3] = {};
   bool is_backward = false;  // the normal's dominant component is negative
   uint32_t material = 0;

@@ -39,9 +39,10 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
 // t is the number of texels of level 0 in the triangle, and c is the triangle's area in square
 // color cells.
 //
-// `area` is twice the triangle's area in square lattice units (1/256 voxel). If it is 0, t and c
-// are the squares of the longest edge in texels and of the longest edge in cells, which has at
-// least one lattice unit. All values are IEEE doubles, computed in the order of the code below.
+// `area` is twice the triangle's area in square lattice units (1/256 voxel). If it is 0, t is the
+// square of the longest edge in texels, and c is the square of the longest edge in color cells,
+// where the length of an edge is at least one lattice unit. All values are IEEE doubles, computed
+// in the order of the code below.
 template <class Textures>
 VOXDAG_HD inline uint32_t pyramid_level(const FixedSurface& surface, Textures& textures,
                                         uint32_t image, int cell_bits, double area) {
@@ -159,7 +160,7 @@ class SurfaceLook {
   // A point of the triangle, and the texels around the point.
   struct Spot {
     SurfacePoint point;
-    TexelSquare texels;  // if there is an image
+    TexelSquare texels;  // unused if the material has no image
   };
   // Returns the spot of a point, and prefetches its texels.
   VOXDAG_HD Spot spot_at(const SurfacePoint& point) const {
@@ -245,7 +246,7 @@ class SurfaceLook {
   Textures& textures_;
   const bool is_cut_;
   uint32_t level_ = 0;                           // level of view_
-  std::optional<typename Textures::View> view_;  // if there is an image
+  std::optional<typename Textures::View> view_;  // nullopt if the material has no image
   Wrap wrap_[2];
   int64_t change_[2][2];  // changes of texture coordinates from corner 0 to corners 1 and 2
   bool is_near_;          // all changes are below kNear

@@ -49,7 +49,7 @@ struct SegmentRange {
 struct ArtifactRoot {
   Cube cube;
   uint32_t index = 0;
-  uint64_t hash = 0;  // truncated to the hash bits
+  uint64_t hash = 0;  // truncated to DagShape::hash_bits bits
   uint64_t voxels = 0;
   uint64_t svo_nodes = 0;
 };

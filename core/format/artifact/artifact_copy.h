@@ -18,7 +18,8 @@ namespace voxdag {
 ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, const Cube& cube,
                           uint32_t grid_levels, SegmentWriter& to);
 
-// The counts of a subvolume of a solid that its artifact does not have (SubDagSummary).
+// Two counts of a subvolume of a solid. SubDagSummary (core/dag/sub_dag.h) defines them. The
+// artifact does not contain them, so the cache entry does.
 struct SolidCounts {
   uint64_t interior = 0, disputed = 0;
 };
@@ -36,7 +37,7 @@ struct CacheEntry {
   ArtifactRef ref;
   ArtifactRoot root;       // the artifact's root, with the cube of the original build
   uint64_t dag_nodes = 0;  // total of all levels
-  SolidCounts solid;       // 0 in the entry of a shell
+  SolidCounts solid;       // 0 if the subvolume is not of a solid
 };
 
 // Opens the cache entry of `key` and reads its artifact's index. Throws Error{kNotFound} if the

@@ -18,7 +18,7 @@ struct ArtifactWriter::State {
   uint64_t offset;
   ArtifactIndex index;
   bool level_open = false;
-  uint64_t child_rows = 0;  // rows of the level below the open one
+  uint64_t child_rows = 0;  // rows of the level below the open level
   LastRow last;
   // Rows that do not yet fill a frame.
   std::vector<uint64_t> values;  // hashes of nodes, or masks of bricks

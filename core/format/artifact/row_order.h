@@ -25,7 +25,7 @@ const char* check_brick_order(std::span<const uint64_t> hashes, std::span<const 
 // Checks nodes:
 //
 //   - masks are not 0, and the number of children is the number of set bits in all masks;
-//   - child indices are below `child_rows`, the number of rows of the next level;
+//   - child indices are below `child_rows`, the number of rows of the level below;
 //   - hashes are truncated to `hash_bits`;
 //   - nodes strictly increase by (hash, mask, children).
 //

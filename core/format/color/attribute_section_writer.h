@@ -1,7 +1,7 @@
 // Writes the section of an attribute after the levels of a global file. A tier is up to seven
-// consecutive levels; tier 0 has the finest. A region is a part of a tier with up to 64^3 cells of
-// the tier's finest level. docs/format.md documents the byte layout in "The color section" and "The
-// sections of alpha, normals and materials".
+// consecutive levels; tier 0 has the finest levels. A region is a part of a tier with up to 64^3
+// cells of the tier's finest level. docs/format.md documents the byte layout in "The color section"
+// and "The sections of alpha, normals and materials".
 //
 // The regions of tier 0 are written when they are added. The cells of the coarser tiers, and the
 // directories of all tiers, are in memory until finish(). This memory is charged to the budget. It
@@ -31,9 +31,9 @@ class AttributeSectionWriter {
                                                    std::span<const ColoredCell> cells)>;
 
   // The levels of `file` must be complete and not empty. The set cells of the levels 0 to
-  // `cell_levels` (2 to 20, at most the grid's) have the attribute. If the values are indices in a
-  // list of names, `names` is this list. Without `encode_coarse`, a cell of a coarser tier has the
-  // color of its sum.
+  // `cell_levels` have the attribute. `cell_levels` is at least 2, and at most the number of grid
+  // levels, which is at most 20. If the values are indices in a list of names, `names` is this
+  // list. Without `encode_coarse`, a cell of a coarser tier has the color of its sum.
   AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                          std::span<const std::string> names, MemoryBudget& budget,
                          EncodeColors encode_coarse = nullptr);

@@ -1,5 +1,5 @@
-// An array that grows when elements are appended. Its pages are charged to a budget; `what` names
-// them in errors.
+// An array that grows when elements are appended. Its memory is charged to a budget. `what` names
+// the array's contents in error messages.
 #pragma once
 
 #include <algorithm>

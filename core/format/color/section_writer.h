@@ -23,8 +23,8 @@ namespace voxdag {
 class SectionWriter {
  public:
   // The levels of `file` must be complete and not empty. The set cells of the levels 0 to
-  // `cell_levels` (2 to 20, at most the grid's) have the attribute. `block_bytes` is the number of
-  // bytes for the values of 32 cells.
+  // `cell_levels` have the attribute. `cell_levels` is at least 2, and at most the number of grid
+  // levels, which is at most 20. `block_bytes` is the number of bytes for the values of 32 cells.
   SectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                 uint32_t block_bytes, MemoryBudget& budget);
 

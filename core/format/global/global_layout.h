@@ -17,7 +17,8 @@ namespace voxdag::global_layout {
 inline constexpr uint64_t kMagic = 0x0a1a0a4741445689;  // 0x89 "VDAG" LF 0x1a LF
 inline constexpr uint32_t kVersion = 1;
 inline constexpr uint32_t kVersionWithFeatures = 2;
-inline constexpr uint64_t kWideLevels = 1;  // feature bits
+// Feature bits of the header: a level is wide, the file has attribute sections.
+inline constexpr uint64_t kWideLevels = 1;
 inline constexpr uint64_t kAttributes = 2;
 inline constexpr uint64_t kPageBytes = 4096;
 inline constexpr uint64_t kChecksumBlockBytes = uint64_t{1} << 16;
@@ -59,7 +60,7 @@ inline constexpr size_t kTableOffsetAt = 96;
 inline constexpr size_t kTableCountAt = 104;
 inline constexpr size_t kTableChecksumAt = 112;
 inline constexpr size_t kAttributeCountAt = 120;
-inline constexpr size_t kLevelsAt = 128;        // entry l is level l
+inline constexpr size_t kLevelsAt = 128;        // entry l describes level l
 inline constexpr size_t kLevelEntryBytes = 32;  // offset, nodes, words, pointer bits
 inline constexpr size_t kMaxLevels = 32;        // capacity of the table; 19 are used at most
 inline constexpr size_t kAttributesAt = kLevelsAt + kMaxLevels * kLevelEntryBytes;

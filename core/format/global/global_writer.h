@@ -5,9 +5,9 @@
 // Levels are stored in the order in which the merge finishes them, from the bricks up to the root.
 // Within a level everything is addressed in 32-bit words from the level's start. A brick is two
 // words, the low half of the mask first. A node is its child mask, then the word offsets of its
-// children in the next level. An offset is one word, or two (low half first) if the next level is
-// wide (has more than narrow_words() words). Nothing in the file depends on the time, the place or
-// the machine.
+// children in the next finer level. An offset is one word, or two (low half first) if the next
+// finer level is wide (has more than narrow_words() words). Nothing in the file depends on the
+// time, the path or the machine.
 //
 // Checksums are computed from the words and bytes that the caller passes in, not from the file.
 // (Exception: resume() reads the last, incomplete checksum block from the file, and compares it

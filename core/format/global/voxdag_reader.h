@@ -5,8 +5,8 @@
 //     voxdag_reader::File dag("scene.vdag");               // throws voxdag_reader::Error
 //     voxdag_reader::File packed(data, size);              // a file that is already in memory
 //     bool set = dag.voxel(x, y, z);                       // 0 <= x, y, z < dag.resolution()
-//     dag.walk(visitor);                                   // depth first, the visitor may prune
-//     if (auto rgb = dag.color(x, y, z, level)) ...        // of a cell of edge R/2^level
+//     dag.walk(visitor);                                   // depth first; can skip subtrees
+//     if (auto rgb = dag.color(x, y, z, level)) ...        // color of a cell of edge R/2^level
 //     voxdag_reader::ColorCursor colors(dag);              // the same, fast for nearby cells
 //     dag.alpha(x, y, z, level), dag.normal(...), dag.material(...), dag.material_names()
 //     const voxdag_reader::Level& level = dag.level(l);    // raw words, for an upload to the GPU
@@ -14,9 +14,10 @@
 // Level l has cubes of edge R/2^l voxels. Level 0 is the root. Bricks (4x4x4 voxels) are level
 // brick_level() = log2(R) - 2. Within a level everything is addressed by word offsets:
 //     brick:  [mask, low 32 bits] [mask, high 32 bits]     bit = 32x1 + 16y1 + 8z1 + 4x0 + 2y0 + z0
-//     node:   [child mask, 8 bits] [offset of each child in the next level, in child order]
-// An offset is one word; if the next level's pointer_bits are 64, it is two words, low half first.
-// Child index = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
+//     node:   [child mask, 8 bits] [offset of each child in level l + 1, in child order]
+// In the formula of the bit, x1 and x0 are bits 1 and 0 of the voxel's coordinate x. An offset is
+// one word; if the pointer_bits of level l + 1 are 64, it is two words, low half first. Child index
+// = 4x + 2y + z. A scene without voxels has no nodes: empty() is true.
 //
 // Opening a file checks the header, and that the levels and the checksum table are within the file.
 // Nodes and bricks are checked when they are read: a bad offset in a damaged file is an Error,

@@ -69,7 +69,7 @@ inline Rgb block_color(const unsigned char* block, unsigned i) {
   const auto mix = [](unsigned a, unsigned b, unsigned weight, unsigned top) {
     return static_cast<unsigned char>((a * (top - weight) + b * weight + top / 2) / top);
   };
-  if (u16(0) == 0) {  // mode B: ends of 24 bits, weights of 2 bits
+  if (u16(0) == 0) {  // mode B: two end colors of 24 bits, weights of 2 bits
     const unsigned w = static_cast<unsigned>(block[8 + i / 4] >> 2 * (i % 4)) & 3;
     return {mix(block[4], block[7], w, 3), mix(block[3], block[6], w, 3),
             mix(block[2], block[5], w, 3)};
@@ -114,7 +114,7 @@ struct ColorTier {
   uint64_t region_count = 0;
   uint64_t cell_count = 0;  // set cells of all levels of the tier
   uint32_t finest_level = 0, region_level = 0;
-  uint32_t block_bytes = 16;  // bytes for 32 cells
+  uint32_t block_bytes = 16;  // bytes for the values of 32 cells
 };
 
 // Returns the name of a region for messages.
@@ -146,8 +146,9 @@ struct ColorRegion {
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
   // The prefixes are two tables that help to compute ranks. Table 0 is for the cells of the finest
   // level, table 1 for the cells of the next coarser level. A table has one entry for each ancestor
-  // four levels above these cells, in Morton order. The entry is the number of cells that come
-  // before the cells below this ancestor. prefix_count() returns the number of entries of a table.
+  // four levels above these cells, in Morton order. The entry is the number of cells of the table's
+  // level that come before the cells below this ancestor in the region. prefix_count() returns the
+  // number of entries of a table.
   uint64_t prefix_count(uint32_t table) const {
     return table + 5 < level_count ? counts[table + 4] : 0;
   }

@@ -26,8 +26,9 @@ class WatchedFile {
   }
 
   // Returns the result of work(). If work() throws an Error, pages of zeros may be the cause. So
-  // run() then calls check_readable(), whose error replaces the error of work(). If work() does not
-  // throw, it must call check_readable() itself before it publishes a result.
+  // run() then calls check_readable(), whose error replaces the error of work(). If work() returns,
+  // run() does not call check_readable(). So work() itself must call it before it publishes a
+  // result.
   template <class Work>
   auto run(const Work& work) const {
     try {

@@ -8,12 +8,13 @@
 //      In the order by hash, they strictly increase in the total order (hash, mask, child indices).
 //      The hashes are computed from the bricks up.
 //   4. There is one root, and every other node has a parent.
-//   5. The numbers of voxels and octree nodes in the header equal the DAG's.
+//   5. The numbers of voxels and octree nodes in the header equal the numbers that are computed
+//      from the DAG.
 //   6. Colors and other attributes satisfy the rules in verify_colors.h.
 //
 // Needs 2 bits of memory per word of the file, and 9 bytes per node of two consecutive levels,
-// charged to the budget. In the order by first parent, also 64 MiB per thread. All threads work on
-// the same level. The result does not depend on the number of threads.
+// charged to the budget. If the nodes are in the order by first parent, needs another 64 MiB per
+// thread. All threads work on the same level. The result does not depend on the number of threads.
 #pragma once
 
 #include <cstdint>

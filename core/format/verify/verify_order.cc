@@ -12,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kNodesPerRange = uint64_t{1} << 22;  // 64 MiB
+constexpr uint64_t kNodesPerRange = uint64_t{1} << 22;  // their HashedNodes take 64 MiB
 
 struct HashedNode {
   uint64_t hash = 0;

@@ -79,7 +79,8 @@ class Attributes {
   posix_spawnattr_t attributes_;
 };
 
-// Appends the bytes that `fd` has now to `out`. Returns false at the end of the program's output.
+// Reads the bytes that `fd` has now, and appends them to `out`. Returns false at the end of the
+// program's output.
 bool read_some(int fd, std::string& out) {
   std::array<char, 65536> buffer;
   const ssize_t n = ::read(fd, buffer.data(), buffer.size());

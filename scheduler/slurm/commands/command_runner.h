@@ -27,7 +27,7 @@ class CommandRunner {
 
 CommandRunner& system_commands();
 
-// True for an environment variable that commands do not get: one that changes the behavior of
+// True for an environment variable that commands do not get, because it changes the behavior of
 // Slurm's commands or describes the Slurm job of this process. Submitted tasks must not inherit the
 // description of this job. `variable` is NAME=value.
 bool is_hidden_variable(std::string_view variable);

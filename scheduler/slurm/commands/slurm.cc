@@ -88,13 +88,13 @@ std::string field(const std::string& text, const std::string& name) {
   return value == "(null)" ? "" : trimmed(value);
 }
 
-// True if the option's value may be the next word.
+// True if the next word can be the option's value.
 bool takes_next_word(const std::string& option) {
   return option.starts_with("--") ? option.find('=') == std::string::npos
                                   : option.starts_with('-') && option.size() == 2;
 }
 
-// True if Slurm could not be reached or did not answer, so that a later attempt may succeed.
+// True if Slurm could not be reached or did not answer, so that a later attempt can succeed.
 bool is_unreachable(const CommandResult& result) {
   for (const char* sign : {"Unable to contact", "Connection refused", "timed out", "Socket timed",
                            "Zero Bytes", "communications", "temporarily", "try again"})

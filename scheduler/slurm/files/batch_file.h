@@ -59,8 +59,8 @@ struct Batch {
 };
 
 // Writes the file, and makes it durable under its name. open(i) must return the triangles of
-// batch.subvolumes[i]. `rows`: the file of the solid's rows; null for a shell. Throws
-// DamagedTriangles if open(i) returns fewer triangles than expected, and Error{kCorrupt} for
+// batch.subvolumes[i]. `rows`: the file of the solid's rows; null if the build is not a solid.
+// Throws DamagedTriangles if open(i) returns fewer triangles than expected, and Error{kCorrupt} for
 // damaged rows.
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,

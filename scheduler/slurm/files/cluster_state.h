@@ -37,7 +37,7 @@ struct AttemptEnd {
 
 // Error of a batch's current attempt that is known before Slurm reports the task's end: the error
 // that the task reported, the reason why its record was rejected, or Slurm's reason for not
-// starting it.
+// starting the task.
 struct AttemptError {
   std::string text;
   bool has_ended = false;  // the task has ended, even if Slurm still lists it

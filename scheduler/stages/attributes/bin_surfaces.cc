@@ -118,7 +118,7 @@ class SurfacePiece {
   const CubeTree& tree_;
   const MemoryCharge charge_;
   CubeTree::Hint hint_;
-  std::vector<std::byte> bytes_, triangles_;  // the records; the bytes in ingest's digest
+  std::vector<std::byte> bytes_, triangles_;  // the records; the data for ingest's digest
   std::vector<Record> records_;               // their data is in bytes_
   std::vector<Place> places_;
   size_t late_ = kNone;  // first record whose places were not added

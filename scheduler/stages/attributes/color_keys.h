@@ -32,7 +32,7 @@ struct BinContent {
 // An attribute of the cells, and its size.
 struct StoredAttribute {
   Attribute kind = Attribute::kColor;
-  uint32_t value_bytes = 0;  // per cell; 0 for colors
+  uint32_t value_bytes = 0;  // bytes per cell; 0 for colors, which are stored in blocks of 32 cells
 };
 
 // Returns the look of each material: a digest of all properties of the material that influence the

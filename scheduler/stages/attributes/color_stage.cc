@@ -76,7 +76,7 @@ void check_list(std::span<const std::string> materials) {
 struct BakeWorker {
   std::unique_ptr<TextureReader> textures;
   std::optional<CubeBaker> baker;
-  CubeBaker::Records records;  // for each attribute, the cube's last part
+  CubeBaker::Records records;  // for each attribute, the last part of the cube's records
   bool is_baked = false;       // baked in this run; otherwise its records are in the ColorStore
 };
 

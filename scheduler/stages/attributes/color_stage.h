@@ -28,7 +28,7 @@ struct ColorSource {
   Grid grid;
   std::string digest;            // digest of the triangles that ingest read
   std::string work_folder;       // for scratch files
-  std::string artifact_path;     // file of the colors that outlive a run
+  std::string artifact_path;     // file of the stored artifacts (color_store.h)
   double checkpoint_interval_s;  // seconds between two syncs of that file
 };
 

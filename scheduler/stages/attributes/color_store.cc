@@ -96,7 +96,7 @@ ColorStore::~ColorStore() {
   try {
     if (pending_.valid()) pending_.get();
   } catch (const std::exception&) {
-    // A later run bakes the cubes that are not durable again.
+    // Ignores the error. A later run bakes the cubes whose artifacts are not durable.
   }
 }
 

@@ -38,7 +38,7 @@ struct ExecutorOptions {
   std::string segment_folder;
   uint32_t first_segment_id = 0;
   double checkpoint_interval_s = 2;
-  SolidRows* rows = nullptr;       // null for the shell
+  SolidRows* rows = nullptr;       // null if the build is not a solid
   ArtifactCache* cache = nullptr;  // null if builds do not share artifacts
 };
 

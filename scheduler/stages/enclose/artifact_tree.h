@@ -1,4 +1,7 @@
-// Finds the artifact that has the voxels of a cube of the grid.
+// Finds the artifact that has the voxels of a cube of the grid. An artifact can have several roots.
+// Each root represents the voxels of one cube of the grid, the *root cube*. If a part (FilledPart)
+// is smaller than a root cube around it, the cube of the part takes the place of the root cube.
+// find() compares its argument with the root cubes of all artifacts.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +19,13 @@ namespace voxdag {
 class ArtifactTree {
  public:
   enum class Kind : uint8_t {
-    kEmpty,   // no root of an artifact overlaps the cube, so it has no voxels
-    kInside,  // the cube is inside the cube of one root
-    kDivided  // the cube contains smaller cubes of roots
+    kEmpty,   // the argument overlaps no root cube, so it has no voxels
+    kInside,  // the argument is a root cube, or is inside a root cube
+    kDivided  // the argument contains root cubes that are smaller
   };
   struct Place {
     Kind kind = Kind::kEmpty;
-    ArtifactRef artifact;  // kInside
+    ArtifactRef artifact;  // the artifact with this root cube; only for kInside
   };
 
   // Reads the roots of all parts' artifacts.
@@ -31,8 +34,8 @@ class ArtifactTree {
   Place find(const Cube& cube) const;
 
  private:
-  // The cubes of the roots that overlap the parts, and their artifacts. If the cube of a root is
-  // larger than the part, `cubes` has the cube of the part instead.
+  // The root cubes that overlap the parts, and their artifacts. If a root cube is larger than the
+  // part, `cubes` has the cube of the part instead.
   struct Roots {
     std::vector<Cube> cubes;
     std::vector<ArtifactRef> artifacts;

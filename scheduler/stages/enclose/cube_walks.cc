@@ -173,8 +173,8 @@ class WalkPass {
   const uint32_t radius_;
   const ArtifactTree tree_;
   FilledParts& result_;
-  const uint32_t levels_;  // of the positions' grid
-  const DagShape shape_;   // of the result
+  const uint32_t levels_;  // levels of the positions' grid
+  const DagShape shape_;   // shape of the result's grid
   EncloseWorkers workers_;
   std::vector<Cube> cubes_;
   std::mutex mutex_;  // guards parts_

@@ -1,7 +1,7 @@
-// Two passes of the stage `enclose` that only builds with --radius V have. In these builds a cube
+// Two passes of the stage `enclose`, which only builds with --radius V need. In these builds a cube
 // of V + 1 voxels per edge walks through the empty space (core/dag/space/cube_walk.h explains the
-// terms). The stage's search for enclosed space then finds the closed positions. One of the passes
-// precedes this search, the other follows it:
+// terms). find_blocked() is the first pass. From its result, the stage's search for enclosed space
+// computes the closed positions. find_enclosed() is the second pass:
 //
 //   shell -> find_blocked() -> blocked positions -> closed positions -> find_enclosed() -> solid
 //

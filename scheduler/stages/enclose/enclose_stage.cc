@@ -229,8 +229,8 @@ class Enclosure {
     if (worker.is_due(job_)) worker.save(result_);
   }
 
-  // Collects all filled parts, adds the empty cubes outside the parts that are enclosed (as full
-  // cubes), and marks FilledParts as complete.
+  // Collects all filled parts. Adds the enclosed empty cubes between the parts as full cubes.
+  // Completes result_ with these parts.
   void finish(const OutsideSpace& outside) {
     std::vector<FilledPart> all;
     for (const LabeledPart& part : parts_)

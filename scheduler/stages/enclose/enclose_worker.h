@@ -54,7 +54,8 @@ EncloseWorkers make_enclose_workers(BuildJob& job, const WorkerMemory& memory);
 // durable.
 void complete_pass(FilledParts& result, std::vector<FilledPart> parts, EncloseWorkers& workers);
 
-// Warns if the solid in `filled` has no interior or, in a build with a seed, if `is_seed_outside`.
+// Warns if the solid in `filled` has no interior. In a build with a seed, also warns if
+// `is_seed_outside` is true.
 void warn_of_walks(BuildJob& job, const std::vector<FilledPart>& filled, bool is_seed_outside);
 
 }  // namespace voxdag

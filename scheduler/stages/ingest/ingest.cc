@@ -174,7 +174,7 @@ class SnappedPiece {
   PageBuffer<std::byte> records_;
   size_t stored_ = 0;  // number of records
   std::optional<VisiblePatches> divider_;
-  std::vector<FixedTriangle> patches_;  // of one triangle
+  std::vector<FixedTriangle> patches_;  // patches of one triangle
   size_t patches_in_piece_ = 0;
   std::vector<FixedSurface> late_;  // triangles whose patches exceed kMaxPatches
   std::vector<std::byte> identity_;

@@ -37,7 +37,7 @@ void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, Top
             const StageContext& context, const AfterPiece& after_piece,
             const Cutouts* cutouts = nullptr);
 
-// Returns the digest of a scene before its first triangle.
+// Returns the digest of a scene to which no triangles have been added yet.
 ContentDigest initial_digest(const Grid& grid, const Cutouts* cutouts);
 
 }  // namespace voxdag

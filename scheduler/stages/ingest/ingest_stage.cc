@@ -24,12 +24,12 @@ namespace {
 // tables fit in the processor's caches.
 constexpr double kMaxBricksPerSubvolume = 4e6;
 // Maximum expected bricks per flat subvolume, which has large triangles (SubvolumeLimits). Building
-// it takes only 3 to 16 ns per expected brick, so it may be larger than other subvolumes. With
-// larger subvolumes, fewer equal nodes occur in more than one subvolume, so the merge reads fewer
-// rows.
+// it takes only 3 to 16 ns per expected brick, so this maximum is higher than the maximum of
+// other subvolumes. With larger subvolumes, fewer equal nodes occur in more than one subvolume, so
+// the merge reads fewer rows.
 constexpr double kMaxBricksPerFlatSubvolume = 128e6;
-// Bytes of memory per expected brick, enough for most flat subvolumes. The others may need more
-// memory than a worker has; they are then split.
+// Bytes of memory per expected brick, enough for most flat subvolumes. If a flat subvolume
+// needs more memory than a worker has, the worker splits it.
 constexpr double kBytesPerFlatBrick = 16;
 // A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
 // kMinBricksPerSubvolume expected bricks.

@@ -91,7 +91,7 @@ class TopTree {
     const uint32_t depth_;
     std::vector<Entry> entries_;                 // a cell can have several entries
     std::vector<LargeTriangle> large_;           // triangles that touch more than kMaxTouched cells
-    std::array<uint32_t, kSlots> last_entry_{};  // index of the last entry with code % kSlots
+    std::array<uint32_t, kSlots> last_entry_{};  // by code % kSlots: index of the last such entry
     std::vector<uint64_t> touched_;              // cells that the last triangle touches
     CubeInside last_cell_;  // cell of the last triangle that is inside one cell
     size_t entry_of_last_cell_ = 0;

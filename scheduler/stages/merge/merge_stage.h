@@ -1,8 +1,8 @@
 // The merge stage: turns the artifacts of all subvolumes into the levels of the global file.
 //
 // Resume rule: the merge continues at its checkpoint in the job store. When the merge starts, the
-// artifacts that CommitQueue received last may not be durable yet. They become durable before a
-// checkpoint refers to them.
+// artifacts that CommitQueue received last are possibly not durable yet. They become durable before
+// a checkpoint refers to them.
 #pragma once
 
 #include <span>
@@ -14,7 +14,7 @@
 
 namespace voxdag {
 
-// Returns each artifact of the subvolumes once, although several subvolumes may share an artifact.
+// Returns each artifact of the subvolumes once, even if several subvolumes share the artifact.
 // `store_path` is the job store that lists the subvolumes, for messages.
 std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> subvolumes,
                                             const std::string& store_path);

@@ -35,7 +35,7 @@ constexpr size_t kBatchTriangles = 256;
 class TouchedPiece {
  public:
   // Allocates space for 2 * kPartitionPiece records, or kPartitionPiece + `leaves` if that is more.
-  // So the buffer always has space for the records of one triangle, which may touch all leaves.
+  // So the buffer always has space for the records of one triangle, even if it touches all leaves.
   TouchedPiece(const CubeTree& tree, size_t leaves, size_t record_bytes, MemoryBudget& budget)
       : tree_(tree),
         leaves_(leaves),

@@ -68,7 +68,7 @@ double grow_as_surface(double coarse, double fine, int doublings) {
 // interior, b R^2 for the area of surfaces.
 double grow_as_volume(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
-  const double cube = 2 * (fine - 4 * coarse), square = fine - cube;  // at the fine pilot
+  const double cube = 2 * (fine - 4 * coarse), square = fine - cube;  // both at the fine pilot
   if (cube <= 0) return grow_as_surface(coarse, fine, doublings);
   return std::max((cube * ratio + square) * ratio * ratio, fine);
 }
@@ -117,7 +117,7 @@ void add_colors(const ColorEstimate& colors, Estimate& estimate) {
   estimate.cpu_s = estimate.cpu_s + colors.cpu_s;
 }
 
-// Bytes of the sample rows of all subvolumes, and of the largest one.
+// Bytes of the sample rows of all subvolumes, and of the largest subvolume.
 struct PlannedRows {
   double all = 0, largest = 0;
 };
@@ -274,7 +274,8 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
       estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
-  // The merge's file and the nodes that are being reordered.
+  // Adds the merge's file and the nodes that are being reordered. Both have about the size of the
+  // output file.
   if (options.order != OrderName::kHash)
     estimate.disk_bytes = estimate.disk_bytes + 2.0 * estimate.file_bytes;
   // With cutouts, patches can replace a triangle, so there can be more records than triangles.

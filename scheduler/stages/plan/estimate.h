@@ -58,9 +58,9 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
                         BuildScene& source, const StageContext& context);
 
 // Checks before a build that the disk has space for it, including the decoded images. Throws
-// Error{kNoSpace} if the build cannot fit; warns if it may not fit. Does nothing if
-// RunOptions::force is set. Returns true if the check required an estimate, which runs pilot
-// builds.
+// Error{kNoSpace} if the build cannot fit, and warns if it is possible that it does not fit. Does
+// nothing if RunOptions::force is set. Returns true if the check required an estimate, which runs
+// pilot builds.
 bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
                       const std::string& work_folder, MemoryBudget& budget,
                       const BuildContext& context);

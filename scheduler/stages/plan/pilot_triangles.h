@@ -1,8 +1,8 @@
 // The triangles of a scene on the coarser grid of a pilot. Triangles that become equal on this grid
 // are kept only once if they are close together in the scene's order. If the scene's triangles are
 // much smaller than the pilot's voxels, few triangles remain. They touch the same voxels of the
-// pilot's grid as all triangles. The rules of solids count every crossing of a triangle, so their
-// pilots keep equal triangles, except triangles without area, which cross nothing.
+// pilot's grid as all triangles. The rules of solids count every crossing of a triangle, so the
+// pilots of solids keep equal triangles, except triangles without area, which cross nothing.
 #pragma once
 
 #include <cstdint>

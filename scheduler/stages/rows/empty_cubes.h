@@ -8,8 +8,9 @@
 
 namespace voxdag {
 
-// Returns the largest cubes that contain no cube of `occupied`: the parent of each contains one.
-// The cubes of `occupied` are disjoint. Returns the grid if `occupied` is empty.
+// Returns the maximal cubes that overlap no cube of `occupied`. The parent of each returned cube
+// contains a cube of `occupied`. The cubes of `occupied` are disjoint. Returns the grid if
+// `occupied` is empty.
 std::vector<Cube> maximal_empty_cubes(std::span<const Cube> occupied);
 
 }  // namespace voxdag

@@ -40,7 +40,7 @@ class OutsideRows {
   void add(int axis, int i, int j, bool is_before, int sign);
 
   const TileGrid grid_;
-  const SampleRows rows_;  // of the grid
+  const SampleRows rows_;  // sample rows of the grid
   MemoryBudget& budget_;
   MemoryCharge charge_;
   std::map<std::array<int, 3>, OutsideTile> tiles_;  // by axis and position

@@ -80,7 +80,7 @@ class RowColumn {
   const TileGrid grid_;
   const SolidRule rule_;
   const int first_axis_, second_axis_;
-  const int first_low_, second_low_;  // in tiles
+  const int first_low_, second_low_;  // low corner of the column's square, in tiles
   const int tiles_;
   const MemoryCharge charge_;
   std::vector<int32_t> totals_;  // the rows' totals; after begin(), the current views

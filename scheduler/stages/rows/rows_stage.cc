@@ -22,7 +22,7 @@ struct SumsOfCube {
   RowExtent numbers[3];
 };
 
-// A corner of an empty cube, whose view a column computes.
+// A corner of an empty cube. A column computes the view from this corner.
 struct EmptyCorner {
   size_t empty;  // index of the cube
   int corner;

@@ -95,8 +95,8 @@ std::optional<IngestState> IngestCheckpoint::resume() {
   if (record_->request == request_of(spec_) && files_are_unchanged() &&
       (record_->state.stage != IngestStage::kReady || jobs_->job()))
     return record_->state;
-  // Keeps the saved checkpoint until enable() replaces it, because the files of its scene may be
-  // temporarily unreachable.
+  // Keeps the saved checkpoint until enable() replaces it, because it is possible that the files of
+  // its scene are only temporarily unreachable.
   record_.reset();
   return std::nullopt;
 }
@@ -110,8 +110,8 @@ bool IngestCheckpoint::is_worthwhile(const TriangleSource& scene) const {
 }
 
 void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
-  // If the options give the bounds, all triangles may be outside the grid, where they need no
-  // space.
+  // If the options give the bounds, it is possible that all triangles are outside the grid, where
+  // they need no space.
   if (spec_.run.force || spec_.geometry.bounds) return;
   const double bytes = static_cast<double>(scene.declared_triangles()) *
                        static_cast<double>(triangle_record_bytes(is_wide(spec_)));

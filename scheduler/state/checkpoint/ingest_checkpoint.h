@@ -5,10 +5,10 @@
 //
 // Invariants:
 //   1. The row refers only to bytes of the file that were synced before the row was written.
-//   2. A row is valid only for the same request, and if every file that decides the voxels (the
-//      scene's files, and the images of cutouts that are left out) is unchanged: same
-//      inode, size and times. When the scene was opened, the times must have been so old that any
-//      later change of a file gives it different times.
+//   2. A row is valid only if the request is the same, and if every file that decides the voxels
+//      (the scene's files, and the images of cutouts that are left out) has the same inode, size
+//      and times. When the scene was opened, the times must have been so old that any later change
+//      of a file gives it different times.
 //   3. An invalid or damaged row is removed, and the scene is read again.
 // Used by one thread.
 #pragma once
@@ -108,9 +108,9 @@ class IngestCheckpoint {
 };
 
 // Returns the maximum disk space of a scene's stored triangles, reached at the end of the
-// partition. On the disk are all triangles if the scene is large enough for checkpoints, and
-// otherwise the triangles that do not fit in memory. `records`: number of stored triangles. It
-// exceeds `triangles` if patches replace triangles that are cut out in part.
+// partition. If the scene is large enough for checkpoints, all triangles are on the disk. Otherwise
+// only the triangles that do not fit in memory are on the disk. `records`: number of stored
+// triangles. It exceeds `triangles` if patches replace triangles that are cut out in part.
 double max_disk_bytes(const BuildSpec& spec, uint64_t triangles, uint64_t records);
 // Returns the earliest Unix time, in nanoseconds, after which every change of one of these files
 // also changes its FileIdentity (core/io/file_system.h). An earlier change can get the same file

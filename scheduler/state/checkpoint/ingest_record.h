@@ -17,7 +17,7 @@
 namespace voxdag {
 
 struct IngestCounts {
-  uint64_t triangles = 0;        // triangles that may touch the grid
+  uint64_t triangles = 0;        // triangles whose bounding boxes touch the grid
   uint64_t dropped_outside = 0;  // triangles whose bounding boxes miss the grid
   uint64_t dropped_invalid = 0;
   double expected_voxels = 0;  // sum over the triangles; shared voxels count more than once

@@ -1,5 +1,5 @@
-// A scene of many quads with one image, in a separate file, whose transparent texels cut out parts
-// of the quads.
+// A scene of many quads with one image. The image is a separate file. Its transparent texels cut
+// out parts of the quads.
 #pragma once
 
 #include <cstdint>

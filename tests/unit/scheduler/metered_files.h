@@ -25,7 +25,7 @@ class MeteredFiles : public ForwardingFiles {
   std::map<std::string, uint64_t> failing_sync;    // by path: number of the sync that fails, from 1
   std::string full_for;                            // path of a file whose writes fail with kNoSpace
   uint64_t free_bytes = UINT64_MAX;
-  std::string other_disk;  // path of a folder that reports its own device
+  std::string other_disk;  // path of a folder that is reported to be on another disk
 
   void forget_counts() {
     bytes_read.clear();

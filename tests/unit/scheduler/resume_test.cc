@@ -129,8 +129,8 @@ TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   }
 }
 
-// Also in a build that reorders the nodes. The merge resumes its own file, which is removed at the
-// end even if the work folder is kept.
+// A build that reorders the nodes also resumes after an interruption in build, merge or reorder.
+// The merge resumes its own file, which is removed at the end even if the work folder is kept.
 TEST_F(ResumeTest, ResumesABuildThatReordersTheNodes) {
   BuildSpec ordered = spec();
   ordered.geometry.order = OrderName::kFirstParent;
@@ -156,7 +156,7 @@ TEST_F(ResumeTest, ResumesABuildThatReordersTheNodes) {
   }
 }
 
-// A damaged file of the merge is merged again, from artifacts that are intact.
+// If the merge's file is damaged, the next run merges the intact artifacts again.
 TEST_F(ResumeTest, MergesAgainIfTheFileToReorderIsDamaged) {
   BuildSpec ordered = spec();
   ordered.geometry.order = OrderName::kFirstParent;

@@ -389,7 +389,7 @@ TEST_F(Cluster, ADamagedSegmentIsBuiltAgain) {
   slurm_.before_task = [&](uint32_t batch) {
     if (batch != 2 || was_damaged) return;
     was_damaged = true;
-    // Batches 0 and 1 are built. Damages the first bytes of the frames of one of them.
+    // Batches 0 and 1 are built. Damages the first bytes of the frames of batch 0.
     for (const auto& entry : std::filesystem::directory_iterator(output() + ".work/cluster"))
       if (entry.path().filename().string().starts_with("attempt-0-"))
         for (const auto& segment : std::filesystem::directory_iterator(entry.path())) {

@@ -51,8 +51,8 @@ TEST_F(Cluster, SolidsByRowsHaveTheSameBytes) {
   }
 }
 
-// The only subvolume is split after a timeout, and then by its tasks. Octants without triangles are
-// empty or full. With --bounds, triangles outside the grid also count.
+// The only subvolume is split after a timeout, and the new tasks split its parts further. Octants
+// without triangles are empty or full. With --bounds, triangles outside the grid also count.
 TEST_F(Cluster, ASplitSubvolumeOfASolidHasTheSameBytes) {
   const Grid whole = run_build(local_spec(), context()).grid;
   const auto bounded = [&](BuildSpec cut) {
@@ -69,7 +69,7 @@ TEST_F(Cluster, ASplitSubvolumeOfASolidHasTheSameBytes) {
 }
 
 // The next run of a failed build reads the saved rows. A build on this machine can also continue
-// it.
+// the failed build.
 TEST_F(Cluster, AFailedBuildOfASolidGoesOn) {
   const BuildReport local = run_build(with_rule(local_spec(), SolidName::kWinding), context());
   expected_ = local.sha256;

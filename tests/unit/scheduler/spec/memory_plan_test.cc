@@ -12,8 +12,8 @@ constexpr uint64_t kMiB = uint64_t{1} << 20, kGiB = uint64_t{1} << 30;
 constexpr uint64_t kBudgets[] = {64 * kMiB, 100'000'000, kGiB, 12 * kGiB};
 constexpr unsigned kThreads[] = {1, 2, 16, 1000};
 
-// The division of some budgets is fixed here, so that a change, which would shift the balance
-// between speed and memory, is noticed.
+// Fixes the division of some budgets. A change that shifts the balance between speed and memory
+// makes this test fail.
 TEST(MemoryPlan, DividesTheBudgetBetweenStages) {
   struct Expected {
     uint64_t budget, top_tree, triangles, partition, pilot;

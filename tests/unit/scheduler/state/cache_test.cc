@@ -174,7 +174,7 @@ class CacheAttack {
   const std::filesystem::path folder_;
   std::mt19937 random_;
   std::atomic<uint64_t> attacks_{0};
-  std::jthread thread_;  // must be the last member
+  std::jthread thread_;  // the last member, because the thread uses the other members
 };
 
 // Links, pipes, folders, and damaged, huge or exchanged files in the cache neither change the

@@ -129,7 +129,7 @@ TEST_P(TriangleStoreTest, FreesABinWithItsLastReference) {
   EXPECT_EQ(share.used(), 0u);
 }
 
-// A stream may begin at any triangle, inside a chunk or between two chunks.
+// A stream can begin at any triangle, inside a chunk or between two chunks.
 TEST_P(TriangleStoreTest, StreamsBeginAnywhere) {
   MemoryBudget share(40000);
   const auto store = open_store(false, share);

@@ -105,7 +105,7 @@ TEST(TopTree, PlansCoverAllThatTrianglesTouch) {
         std::vector<size_t> got;
         tree.for_each_touched(t, hint, [&](size_t leaf) { got.push_back(leaf); });
         std::sort(got.begin(), got.end());
-        // The tree must find all touched leaves. It may also find a leaf that the triangle does not
+        // The tree must find all touched leaves. It can also find a leaf that the triangle does not
         // touch, because it does not test the overlap if one cube contains the triangle's bounding
         // box.
         const auto touched = touched_by_brute_force(t, leaves);
@@ -172,7 +172,7 @@ TEST(TopTree, CountsTheCellsThatTrianglesTouch) {
             const int64_t corner[3] = {x * units, y * units, z * units};
             touched += triangle_touches_cube(t, corner, units);
           }
-      // A triangle that touches no cell may nevertheless be counted, because the overlap is not
+      // It is possible that a triangle that touches no cell is counted, because the overlap is not
       // tested if one cell contains its bounding box.
       if (touched > 0) {
         EXPECT_EQ(top.occupied_cells(), touched) << "size " << size << ", " << i;
@@ -206,7 +206,7 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
 }
 
-// Cubes of large triangles may have more weight than the other cubes.
+// Cubes of large triangles can have more weight than the other cubes.
 TEST(TopTree, FlatSubvolumesHaveASeparateLimit) {
   MemoryBudget budget(uint64_t{1} << 30);
   constexpr int64_t kGrid = int64_t{kUnitsPerVoxel} << kLevels;

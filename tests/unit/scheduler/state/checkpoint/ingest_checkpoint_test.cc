@@ -120,8 +120,8 @@ TEST_F(IngestCheckpointTest, ResumesInThePartition) {
   }
 }
 
-// A build may be resumed with other run options. These may require that subvolumes are split that
-// an earlier run has planned or built. The build then does not read the scene again.
+// A build can be resumed with other run options. If these options require smaller subvolumes, the
+// build splits subvolumes that the earlier run has planned. It does not read the scene again.
 TEST_F(IngestCheckpointTest, RunOptionsMayChange) {
   for (const char* stage : {"ingest", "build"}) {
     SCOPED_TRACE(stage);
