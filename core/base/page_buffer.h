@@ -19,7 +19,7 @@ namespace voxdag {
 // The message contains `what`, the purpose of the pages.
 void* allocate_pages(size_t bytes, std::string_view what);
 // Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which may have
-// changed. The new pages are zero-filled. The old pages may get new addresses, but their bytes are
+// changed. The new pages are zero-filled. The old pages can get new addresses, but their bytes are
 // not copied (except in builds with ThreadSanitizer). Throws like allocate_pages().
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);

@@ -72,8 +72,8 @@ class RowTest {
   VOXDAG_HD int sign() const { return sign_; }
 
   // The values of the three edges' tests (Edge) at a row: the triangle crosses the row iff all
-  // values are >= 0. edge_steps() returns how much these values increase from a row to the row that
-  // is `distance` units further along axis c (along axis b if `is_along_c` is false).
+  // values are >= 0. edge_steps() returns the increase of these values if the row moves by
+  // `distance` units along axis c (along axis b if `is_along_c` is false).
   struct EdgeValues {
     EdgeInt of[3];
   };

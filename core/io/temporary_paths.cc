@@ -14,7 +14,7 @@ struct RegisteredPaths {
   std::multiset<std::string> paths;
 };
 
-// Returns the registered paths. They are never destroyed, because threads may use them until the
+// Returns the registered paths. They are never destroyed, because threads can use them until the
 // process ends.
 RegisteredPaths& registered() {
   static auto* const all = new RegisteredPaths;

@@ -20,7 +20,7 @@ class TemporaryPath {
 };
 
 // Removes all registered files and folders. Call it immediately before the process ends. Ignores
-// errors. Other threads may still write to the files.
+// errors. Other threads can still be writing to the files.
 void remove_temporary_paths();
 
 }  // namespace voxdag

@@ -37,8 +37,8 @@ void StateSaver::save(uint32_t level, MergeState state,
                       std::vector<SegmentRange> merged) {
   wait();
   saved_s_ = process_cpu_seconds();
-  // If saving fails, either the previous or the new state may be the durable one, so the files of
-  // both states are kept.
+  // If saving fails, the durable state is either the previous or the new one, so the files of both
+  // states are kept.
   const auto before = static_cast<std::ptrdiff_t>(named_.size());
   named_.insert(named_.end(), named.begin(), named.end());
   save_ = run_in_background([this, level, before, state = std::move(state), sync = std::move(sync),

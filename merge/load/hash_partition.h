@@ -5,7 +5,7 @@
 //   buckets:   the interval, divided into shares of 2^bucket_bits hashes
 //
 // A slice is the part of a run that is in the partition. It consists of complete frames, so a few
-// rows at its ends may be outside the interval.
+// rows at its ends can be outside the interval.
 //
 // Within a slice rows are in the order of their hashes, so each bucket is a contiguous part of
 // every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice). Usually one partition is

@@ -8,7 +8,7 @@ FrameSpan LevelRun::frames_within(const HashInterval& interval) const {
   const auto first_hash = [](const FrameInfo& frame) { return frame.first_hash; };
   const auto begin = std::ranges::lower_bound(frames_, interval.first, {}, first_hash);
   const auto end = std::ranges::upper_bound(frames_, interval.last, {}, first_hash);
-  // The frame before `begin` starts before the interval but may extend into it.
+  // The frame before `begin` starts before the interval, but can extend into it.
   const auto reaching = begin == frames_.begin() ? begin : begin - 1;
   return {static_cast<size_t>(reaching - frames_.begin()),
           static_cast<size_t>(std::max(reaching, end) - frames_.begin())};

@@ -51,7 +51,7 @@ class LevelRun {
     return {rows_before(frames.end) - rows_before(frames.begin),
             words_before(frames.end) - words_before(frames.begin)};
   }
-  // Returns all frames that may have rows with a hash in the interval, judged by the first hash of
+  // Returns all frames that can have rows with a hash in the interval, judged by the first hash of
   // each frame.
   FrameSpan frames_within(const HashInterval& interval) const;
 

@@ -175,7 +175,8 @@ class PartitionMerge {
 
 uint64_t bucket_rows(const MergeContext& context, const LevelTask& task) {
   const uint64_t rows = std::max<uint64_t>(kBucketRows, kMinBucketRowsPerRun * task.runs.size());
-  // A bucket of average size may take half of a worker's memory, because some buckets are larger.
+  // A bucket of average size gets at most half of a worker's memory, because some buckets are
+  // larger than average.
   const uint64_t row_bytes = BucketSorter::bytes_for({1, task.format.max_words()});
   return std::min(rows, context.plan.worker_bytes / (2 * row_bytes));
 }

@@ -9,8 +9,8 @@ namespace {
 // If more rows than this have equal digits (see distribute()), std::sort() sorts them before the
 // insertion sort, which is fast for a few rows only.
 constexpr uint32_t kMaxInsertionRows = 32;
-// Number of slices ahead whose rows are prefetched. A bucket has only a few rows of each slice, and
-// the slices are at scattered addresses.
+// The rows of a slice are prefetched this many slices before they are read. A bucket has only a few
+// rows of each slice, and the slices are at scattered addresses.
 constexpr size_t kSlicesAhead = 8;
 
 template <class T>

@@ -114,7 +114,7 @@ uint64_t CudaDevice::available(const std::string& where) const {
              "cudaMemPoolGetAttribute", where);
   check_call(cudaMemPoolGetAttribute(pool_, cudaMemPoolAttrUsedMemCurrent, &used),
              "cudaMemPoolGetAttribute", where);
-  // Other workers may allocate memory between the calls above, so `used` can exceed `reserved`.
+  // Other workers can allocate memory between the calls above, so `used` can exceed `reserved`.
   return free_bytes + (reserved > used ? reserved - used : 0);
 }
 
@@ -122,7 +122,7 @@ void* CudaDevice::allocate(uint64_t bytes, const std::string& where) {
   void* memory = nullptr;
   cudaError_t status = cudaMallocAsync(&memory, bytes, stream());
   if (status == cudaErrorMemoryAllocation) {
-    // The memory that the pool retains may be fragmented. Returns this memory to the device and
+    // The memory that the pool retains can be fragmented. Returns this memory to the device and
     // tries again.
     cudaGetLastError();
     check_call(cudaStreamSynchronize(stream()), "cudaStreamSynchronize", where);

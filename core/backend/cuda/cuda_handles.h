@@ -24,8 +24,8 @@ inline void check_call(cudaError_t status, const char* call, const std::string& 
                                       ")");
 }
 
-// Waits for the stream's work before it destroys the stream. If a build failed, this work may still
-// read pinned memory.
+// Waits for the stream's work before it destroys the stream. After a failed build, this work can
+// still be reading pinned memory.
 struct DestroyStream {
   void operator()(cudaStream_t stream) const {
     cudaStreamSynchronize(stream);

@@ -71,7 +71,7 @@ class CudaSpace {
   template <class T>
   void upload(const T* from, T* to, uint64_t n) {
     transfer(from, to, n, cudaMemcpyHostToDevice);
-    // Waits for the copy, because the caller may free `from` after this call. On some systems an
+    // Waits for the copy, because the caller can free `from` after this call. On some systems an
     // asynchronous copy would still read `from` then.
     check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
   }

@@ -25,8 +25,8 @@ void PlaneDirection::set_up(const Plane& plane, InnerSides inner) {
   int i = 0;
   for (int b = 0; b <= kBuckets; ++b) {
     // Sets i to the index of the first value in bucket b or a later bucket. The value at i - 1 is
-    // in an earlier bucket, so it is less than every offset f in bucket b. The value at i may be
-    // greater than such an offset.
+    // in an earlier bucket, so it is less than every offset f in bucket b. The value at i can be
+    // greater than an offset in bucket b.
     while (i < kCorners && bucket(values_[i]) < b) ++i;
     bucket_[b] = static_cast<uint16_t>(std::max(i - 1, 0));
   }

@@ -2,11 +2,11 @@
 // in one step, in doubles. The four elements of a Quad belong either to the three edges of the
 // triangle (the fourth element is ignored) or to four children.
 //
-// The test need not be exact, because the rasterizers are exact. It may report a child that the
-// triangle does not touch. Two errors must never happen: to omit a touched child, and to report a
-// child as inside (see Entry in triangle_set.h) although the triangle does not cover it. So bounds
-// for touched children are widened, and bounds for inside children narrowed, by more than the
-// rounding error. Vertices and edges are exact in doubles (below 2^42). Normals are computed in
+// The test need not be exact, because the rasterizers are exact. It sometimes reports a child that
+// the triangle does not touch. Two errors must never happen: to omit a touched child, and to report
+// a child as inside (see Entry in triangle_set.h) although the triangle does not cover it. So
+// bounds for touched children are widened, and bounds for inside children narrowed, by more than
+// the rounding error. Vertices and edges are exact in doubles (below 2^42). Normals are computed in
 // integers and rounded once. All other values are sums of at most eight products. A product of a
 // coefficient and a distance has an error of at most 3 * 2^-53 |coefficient| |distance|.
 //

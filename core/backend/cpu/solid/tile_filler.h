@@ -1,6 +1,7 @@
 // Fills the voxels of a tile that are inside a solid (core/geometry/solid_rule.h). At first the
-// tile has only the voxels of the shell. Its units, each filled completely or not at all, are the
-// maximal empty cubes and the components of the other blocks' empty voxels. Not thread-safe.
+// tile has only the voxels of the shell. A unit is filled completely or not at all. The units of a
+// tile are its maximal empty cubes, and the components of the empty voxels in blocks that have
+// voxels of the shell. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -39,13 +40,13 @@ class TileFiller {
   // full_blocks() empty.
   bool fill(TileBricks& tile, int size_log2, const int64_t (&low)[3], const TileViews& views,
             const ForEachTriangle& for_each_triangle, FilledVoxels& filled);
-  // Returns a bit set, in Morton order, of the blocks in those empty cubes that are inside the
-  // solid.
+  // Returns the blocks of the empty cubes that are inside the solid, as a bit set in Morton order.
   const uint64_t* full_blocks() const { return full_; }
 
  private:
-  // A component without a corner of its block, and the walk to it: along z, y and x, from the
-  // block's low corner to the center of the component's first voxel in Morton order.
+  // A component of empty voxels without a corner of its block, and the walk to it. The walk begins
+  // at the block's low corner. It goes along z, then y, then x, to the center of the component's
+  // first voxel in Morton order.
   struct BlindComponent {
     int block;  // index in TileBricks
     Slices voxels;

@@ -99,7 +99,7 @@ TEST(BakeRegion, SumsAreFunctionsOfTheCell) {
 }
 
 // The sums do not depend on the division of the triangles into calls of add(): a triangle that
-// covers a cell may follow in a later call than a triangle that only touches it.
+// covers a cell can come in a later call than a triangle that only touches the cell.
 TEST(BakeRegion, TrianglesMayComeInParts) {
   const TestLooks looks;
   for (const SceneKind kind : oracle::kAllKinds) {

@@ -16,7 +16,7 @@ TEST(ColorVectors, ColumnsAreThoseOfPlainCode) {
   for (int i = 0; i < 50000; ++i) {
     const int64_t most = int64_t{1} << random.between(0, 59);
     const int64_t a = random.between(-most, most), b = random.between(-most, most);
-    // In half of the rounds, the linear function is within 1 of 0 at one of the columns.
+    // In half of the rounds, the tested linear function is -1, 0 or 1 at one of the columns.
     const int64_t first = -a * random.between(0, 3) - b * random.between(0, 3) +
                           (random.coin() ? random.between(-1, 1) : random.between(-most, most));
     const uint32_t columns = color::negative_columns(first, a, b);

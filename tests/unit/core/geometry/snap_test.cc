@@ -20,7 +20,8 @@ int64_t snapped(double x) {
   return out.v[0][0];
 }
 
-// u = 2 floor(128 x) + 1 is the middle of one of the 128 slices of a voxel.
+// A voxel has 128 slices along each axis. u = 2 floor(128 x) + 1 (grid.h) is the middle of the
+// slice that contains x, in units of 1/256 voxel.
 TEST(Snap, GoesToTheMiddleOfASlice) {
   EXPECT_EQ(snapped(0.0), 1);
   EXPECT_EQ(snapped(std::nextafter(1 / 128.0, 0)), 1);

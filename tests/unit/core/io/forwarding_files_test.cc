@@ -25,8 +25,9 @@ class ReplacedFiles : public ForwardingFiles {
   int opened_ = 0;
 };
 
-// open_own() opens the path only once, so the result is the original file even if another file
-// replaces it immediately after the opening. Like the wrapped file system, it refuses links.
+// open_own() opens the path only once. So it returns the original file, even if another file
+// replaces this file immediately after it was opened. Like the wrapped file system, it refuses
+// links.
 TEST(ForwardingFilesTest, OpensAFileOnce) {
   const TemporaryFolder folder;
   const std::string path = folder.file("a");

@@ -129,7 +129,7 @@ class EdgeBounds {
 
   // Requires bounds for the voxels' centers; returns the bounds for the closed voxels. The integer
   // c of the test for closed voxels exceeds the c of the test for centers by at most 1.5 +
-  // (|across| + |up|) / 2. So the returned bounds may be up to 3 / |up| wider than necessary.
+  // (|across| + |up|) / 2. So the returned bounds can be up to 3 / |up| wider than necessary.
   VOXDAG_INLINE EdgeBounds widened() const {
     EdgeBounds out = *this;
     for (int i = 0; i < 4; ++i) out.start_[i] = _mm256_add_pd(start_[i], reach_[i]);

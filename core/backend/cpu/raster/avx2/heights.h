@@ -92,8 +92,8 @@ class Heights {
             static_cast<int>(height >> (kColumnBits - kHeightBits)) & ((4 << kHeightBits) - 1)};
   }
 
-  // Converts `c`, a Column of another plane with the same normal: replaces `within` by this plane's
-  // value. This plane's height must be at most half a voxel above the other plane's height.
+  // Returns `c`, a Column of another plane with the same normal, with `within` replaced by this
+  // plane's value. This plane's height must be at most half a voxel above the other plane's height.
   VOXDAG_INLINE Column in_bricks_of(Column c) const {
     c.within = static_cast<int>(height_of(c.p, c.q) >> (kColumnBits - kHeightBits)) -
                c.brick * (4 << kHeightBits);
@@ -130,9 +130,9 @@ class Heights {
   // Safety margins in units of a lane. With them, `below` and `top` in bounds() never exclude a
   // touched voxel. They allow for three roundings (a column's base is truncated to a whole unit,
   // below_lanes_ are rounded, top_lanes_ are truncated) and for 0.02 units of rounding in floats:
-  //   below   is in (y - 2.02, y - 0.02]. It may be on the wrong side of a whole number of voxels
+  //   below   is in (y - 2.02, y - 0.02]. It can be on the wrong side of a whole number of voxels
   //           that is 1 or 2 units above it.
-  //   top     is in (y + width / n_D + 0.02, y + width / n_D + 2.02]. It may be on the wrong side
+  //   top     is in (y + width / n_D + 0.02, y + width / n_D + 2.02]. It can be on the wrong side
   //           of a whole number of voxels that is 0, 1 or 2 units below it.
   static constexpr double kLowered = 0.52;
   static constexpr float kTopRaised = 2.54f;

@@ -3,7 +3,7 @@
 // voxel passes the plane test along D (thin_triangle.h). This voxel is set if
 //
 //   - the row along D through the column's center crosses the triangle (Footprint::inside), or
-//   - it passes the plane test and the edge tests along one of the other axes.
+//   - the voxel passes the plane test and the edge tests along one of the other axes.
 //
 // The second condition only matters where the first one fails, which is near the triangle's edges.
 // This voxel is the only one of its column that the triangle can set. So the tests along the other
@@ -19,8 +19,8 @@
 namespace voxdag::cpu {
 namespace {
 
-// The tests of a triangle along an axis other than D (thin_triangle.h): finds the voxel columns in
-// which a voxel passes both the plane test and the edge tests along this axis.
+// Tests a triangle along an axis other than D (thin_triangle.h). Finds the voxel columns in which a
+// voxel passes both the plane test and the edge tests along this axis.
 template <int D>
 class SideCrossings {
  public:

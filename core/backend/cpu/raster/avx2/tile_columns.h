@@ -16,10 +16,10 @@
 namespace voxdag::cpu {
 namespace {
 
-// kP and kQ are the axes of the footprint of columns along D; p and q are coordinates along them.
-// The number of a voxel column in its column of bricks has, from bit 0 on: the low bit of p, the
-// low bit of q, the high bit of p, and the high bit of q. kQ is chosen so that the high bit of q is
-// one of the two highest bits of a voxel's bit number in its brick.
+// kP and kQ are the two axes across columns that are parallel to axis D. p and q are the
+// coordinates along these axes. The number of a voxel column in its column of bricks has, from bit
+// 0 on: the low bit of p, the low bit of q, the high bit of p, and the high bit of q. kQ is chosen
+// so that the high bit of q is one of the two highest bits of a voxel's bit number in its brick.
 template <int D>
 constexpr int kP = D == 2 ? 0 : 2;
 template <int D>

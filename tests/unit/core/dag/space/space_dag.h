@@ -123,7 +123,7 @@ class SpaceDag {
   }
   SeedPlace place;
 
-  // Returns the voxels of the tables that `fill_tables` fills.
+  // Returns the voxels of the sub-DAG that `fill_tables` adds to empty tables.
   SpaceGrid filled(const std::function<void(SubDagTables&)>& fill_tables) {
     int size_log2 = 0;
     while (1 << size_log2 < edge_) ++size_log2;

@@ -193,8 +193,8 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
                   "octree nodes, the DAG has "}));
 
-// The error names a child whose word offset is within a node of the next level, or beyond this
-// level.
+// The error names a child pointer whose word offset is in the middle of a node of the next level,
+// or beyond the end of the next level.
 TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
   for (const uint32_t offset : {1u, 1000000u, 0xffffffffu}) {
@@ -236,8 +236,8 @@ TEST_F(VerifyTest, OtherNodeOrdersAreNotRead) {
   EXPECT_EQ(error_of([&] { verify(path_); }).code(), ErrorCode::kUnsupportedVersion);
 }
 
-// A file of many spans has several defects. With any number of threads, the first defect is
-// reported.
+// A large file has several defects. The threads verify different parts of the file, but the first
+// defect is reported with any number of threads.
 TEST_F(VerifyTest, TheFirstDefectIsReported) {
   oracle::Random random(3);
   oracle::Voxels noise(256);
