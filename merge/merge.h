@@ -32,9 +32,10 @@
 
 namespace voxdag {
 
-// Merges all levels into `out`, without sealing it. Writes scratch files through `files`. If
-// `checkpoint` is not null, saves the merge's state there, and resumes the state of an interrupted
-// merge. Discards a state of other inputs with a warning, and starts over. Throws Error.
+// Merges all levels into `out`. Does not seal the file (GlobalFileWriter::seal()). Writes scratch
+// files through `files`. If `checkpoint` is not null, saves the merge's state there, and resumes
+// the state of an interrupted merge. Discards a state of other inputs with a warning, and starts
+// over. Throws Error.
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
                            MemoryBudget& budget, unsigned threads, Progress& progress,
                            const CancelToken& cancel, Checkpoint* checkpoint = nullptr);

@@ -170,8 +170,9 @@ class RowTest {
   Edge edges_[3];
 };
 
-// RowTest for triangles that satisfy has_row_extents() and has_row_coordinates(), for triangles
-// that satisfy only has_row_coordinates(), and for all triangles.
+// NarrowRowTest is for triangles that satisfy has_row_extents() and has_row_coordinates().
+// GridRowTest is for triangles that satisfy has_row_coordinates(). WideRowTest is for all
+// triangles.
 using NarrowRowTest = RowTest<int64_t, int64_t>;
 using GridRowTest = RowTest<int64_t, int128>;
 using WideRowTest = RowTest<int128, int128>;

@@ -57,7 +57,7 @@ struct Grid {
   // center. Throws Error{kInvalidInput} if the scene does not fit in this grid, or if the size or
   // the levels are invalid, and Error{kLimit} if the grid is not finite.
   static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
-  // Returns the smallest number of levels of a grid with voxels of this edge that contains the
+  // Returns the smallest number of levels with which a grid of voxels of this edge contains the
   // scene. Throws Error{kInvalidInput} if the scene fits in no grid, or if the size is invalid.
   static uint32_t levels_for_voxel_size(const WorldBounds& bounds, double voxel_size);
 };

@@ -59,8 +59,8 @@ class OrderedRowWriter {
   uint64_t last_position_ = 0;
 };
 
-// Calls visit(cursor index, row) for all rows of all cursors in the total order. A Cursor has
-// `bool at_end() const`, `RowKey row() const` (valid until it moves) and `void advance()`.
+// Calls visit(cursor index, row) for all rows of all cursors in the total order. A Cursor has `bool
+// at_end() const`, `RowKey row() const` (valid until advance()) and `void advance()`.
 template <class Cursor, class Visit>
 void merge_cursors(const RowFormat& format, std::span<Cursor> cursors, Visit&& visit) {
   std::vector<size_t> heap;

@@ -86,7 +86,7 @@ class HashPartition {
   static std::vector<RunSlice> slices_within(std::span<const LevelRun* const> runs,
                                              const HashInterval& interval);
 
-  // Creates a partition of the rows of `slices`, which load() reads. Buckets get about
+  // Creates a partition for the rows of `slices`. load() reads these rows. Buckets get about
   // `bucket_rows` rows if hashes are spread evenly. Two partitions must not use the same `memory`
   // at the same time.
   HashPartition(std::span<const LevelRun* const> runs, std::vector<RunSlice> slices,

@@ -1,10 +1,10 @@
 // The positions of a level's rows in the merged level: one map, row -> position, for every run.
 //
-// Parents refer to positions. Positions increase with the row, so a run is still in the total order
-// after its children are replaced by their positions. A position is one word, or two in wide maps
-// (put_position()). The maps of all runs are stored one after the other. They are in memory if they
-// fit a limit, and otherwise in a scratch file. One run's map, or a part of it, is loaded from this
-// file on demand.
+// Parents refer to positions. Positions increase with the row (only equal rows of the top tree have
+// equal positions). So a run is still in the total order after its children are replaced by their
+// positions. A position is one word, or two in wide maps (put_position()). The maps of all runs are
+// stored one after the other. They are in memory if they fit a limit, and otherwise in a scratch
+// file. One run's map, or a part of it, is loaded from this file on demand.
 //
 // Several threads may store different rows concurrently. Load only after the last store.
 #pragma once

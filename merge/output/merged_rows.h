@@ -12,7 +12,7 @@
 namespace voxdag {
 
 // A list of rows, encoded as in the global file. A node is its mask followed by its children. A
-// brick, and a wide child, is two words: the low half, then the high half.
+// brick and a wide child take two words each: the low half, then the high half.
 class MergedRows {
  public:
   // Creates a list with space for up to `max` rows.

@@ -27,9 +27,8 @@ class PagePool {
   ~PagePool() { clear(); }
 
   // Returns the size of a new range of pages that can store `bytes` bytes: the next power of two up
-  // to 4 MiB, and above it the next multiple of 2 MiB, the size of a huge page. Only if the size is
-  // such a multiple does the system align the range to huge pages, and move it without dividing
-  // them.
+  // to 4 MiB, and above it the next multiple of 2 MiB, the size of a huge page. The system aligns a
+  // range to huge pages, and moves it without dividing them, only if its size is such a multiple.
   static size_t range_bytes(size_t bytes);
   // Removes and returns the smallest cached range of `bytes` to `max_bytes` bytes. Returns a range
   // with null data if no range fits.

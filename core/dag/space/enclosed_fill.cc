@@ -132,8 +132,8 @@ class Filler {
   }
 
   // Sets bit c of `outside` if component c of the cube is outside. If all components are outside,
-  // sets all bits. Returns false if 64 bits are too few for the components, some of which are
-  // outside and some not.
+  // sets all bits. Returns false if some components are outside and some are not, and 64 bits are
+  // too few for them.
   bool pack_outside(int depth, const LabeledCube& cube, uint64_t& outside) const {
     const uint32_t count = labels_.count(depth, cube.row);
     uint32_t ones = 0;

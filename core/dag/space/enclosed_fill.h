@@ -15,7 +15,7 @@ namespace voxdag {
 
 // Adds the filled sub-DAG to `tables`, which must be empty and have the size of the root's cube.
 // is_outside[c] is 1 if component c of the root reaches the outside, otherwise 0. Throws
-// OutOfBudget, and Error{kCanceled} if `cancel` is not null.
+// OutOfBudget. If `cancel` is not null, also throws Error{kCanceled} after a cancellation.
 void fill_enclosed(PooledMemory& memory, const SpaceLabels& labels,
                    std::span<const uint8_t> is_outside, SubDagTables& tables,
                    const CancelToken* cancel = nullptr);

@@ -29,7 +29,7 @@ class SpaceLabels {
   // `levels` must outlive this object. Throws OutOfBudget if the memory is too small, or if a node
   // has too many components for 16 bits. Neither happens for a cube with the edge kSmallestEdge and
   // a budget of kSmallestBudget (core/backend/backend.h). If `cancel` is not null, also throws
-  // Error{kCanceled}.
+  // Error{kCanceled} after a cancellation.
   SpaceLabels(PooledMemory& memory, const NodeLevels& levels, const CancelToken* cancel = nullptr);
 
   const NodeLevels& levels() const { return levels_; }

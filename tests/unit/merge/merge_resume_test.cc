@@ -179,7 +179,7 @@ TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
   struct MeetingProgress : NoProgress {
     MeetingProgress(Meeting& with, std::string folder)
         : meeting(with), scratch_folder(std::move(folder)) {}
-    // A file in the scratch folder shows that the merge has made a state.
+    // A file in the scratch folder shows that the merge has begun to save a state.
     void advance(uint64_t) override {
       if (!std::filesystem::is_empty(scratch_folder)) meeting.meet(meeting.merging, meeting.saving);
     }

@@ -46,7 +46,7 @@ class PlaneDirection {
   int64_t min_offset() const { return min_offset_; }
   int64_t max_offset() const { return max_offset_; }
 
-  // Returns the node of a cube of 8^3 voxels from which the plane has the offset `f`. Requires
+  // Returns the node of a cube of 8^3 voxels if the plane's offset from this cube is `f`. Requires
   // min_offset() <= f <= max_offset().
   const Known& node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
     Known& known = known_[interval(f)];

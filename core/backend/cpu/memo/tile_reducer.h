@@ -27,8 +27,8 @@ class TileReducer {
   // Returns the node of a tile with an edge of 2^size_log2 voxels, or a NodeRef without a node if
   // the tile has no voxels. Adds the tile's octree nodes and voxels to the tables' counts, and
   // empties the tile. `full` is a bit set, in Morton order, of the voxel blocks that are full
-  // because they are inside a solid. These blocks are empty in `tile`. Null if there are no such
-  // blocks.
+  // because they are inside a solid. These blocks are empty in `tile`. `full` is null if there are
+  // no such blocks.
   NodeRef reduce_bricks(TileBricks& tile, int size_log2, const uint64_t* full = nullptr);
 
   // Returns the node of a cube with an edge of 2^size_log2 voxels, from its nodes with an edge of

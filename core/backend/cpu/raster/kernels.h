@@ -1,6 +1,6 @@
 // The dispatch table of the inner loops (kernels). There are three sets of kernels:
 //
-//   portable
+//   portable   needs no instruction set extensions
 //   AVX2       also needs FMA and BMI2
 //   AVX-512    needs F, BW, DQ, VL and VBMI; the kernels that it does not replace are AVX2's
 //
@@ -40,8 +40,8 @@ struct Kernels {
   // Finds the children of the cube that the triangle may touch. Requires that the triangle touches
   // the cube. `inside`: true if the triangle covers the cube (see Entry in triangle_set.h).
   Octants (*test_octants)(const NarrowTriangle& triangle, const LatticeCube& cube, bool inside);
-  // Sets bit i of `bits` iff low <= values[i] <= high, for `count` values, a multiple of 4; the
-  // other bits of the last word are 0.
+  // Sets bit i of `bits` to 1 iff low <= values[i] <= high, for `count` values. `count` must be a
+  // multiple of 4. The other bits of the last word are 0.
   void (*find_in_range)(const int64_t* values, int count, int64_t low, int64_t high,
                         uint64_t* bits);
   // Finds the non-empty blocks among the first 8 * groups voxel blocks of the tile, and returns the
@@ -62,7 +62,7 @@ struct Kernels {
   // Adds to `reached`, which must be a part of `empty`, all voxels of `empty` that are connected to
   // it by steps between 6-neighbors within `empty`.
   void (*flood)(const Slices& empty, Slices& reached);
-  // Adds `voxels` to a block, in which they must be empty. Returns their number.
+  // Adds `voxels` to a block, in which they must be empty. Returns the number of added voxels.
   uint32_t (*add_slices)(const Slices& voxels, VoxelBlock& block);
 };
 

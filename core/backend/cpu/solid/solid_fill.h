@@ -47,7 +47,7 @@ class SolidFill {
 
   // Returns the views from the corners of a cube that has no voxels of the shell and is at least as
   // large as a tile. In octree order, the tiles before the cube and in the cube must be finished,
-  // and no later tile may have begun.
+  // and later tiles must not have begun.
   UnitViews empty_cube(const LatticeCube& cube);
   // Returns the node of an empty cube that is a unit with the given views: the node of a full cube
   // if the unit is inside the solid, otherwise no node.

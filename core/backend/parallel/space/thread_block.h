@@ -1,4 +1,5 @@
-// Thread block kernels: a group of threads that work in phases on memory they share.
+// Thread block kernels. A thread block is a group of threads that work in phases on memory they
+// share.
 //
 // A kernel K has
 //   K::kThreads                  number of threads of a block

@@ -170,7 +170,7 @@ int winding_at(const oracle::Triangles& mesh, const Point& p, int axis, int* tot
 }
 
 // On closed meshes, the signs on each row sum to 0, and the three rows through a point give the
-// same winding number, also in ties.
+// same winding number, also for rows that pass exactly through edges or planes of triangles.
 TEST(Crossing, ClosesClosedMeshes) {
   for (const oracle::SolidKind kind : oracle::kClosedSolids) {
     SCOPED_TRACE(oracle::kind_name(kind));
