@@ -16,7 +16,7 @@ namespace voxdag::cli {
 void print_json(const nlohmann::ordered_json& json);
 void print_json(const nlohmann::json& json);
 // Prints the JSON on one line. For commands that print several objects over time: a reader can then
-// take each line as an object.
+// parse each line as an object.
 void print_json_line(const nlohmann::ordered_json& json);
 void print_json_line(const nlohmann::json& json);
 // Prints JSON text, with escapes for characters that are not printable.
@@ -26,7 +26,7 @@ void print_json_text(const std::string& json);
 // attribute.
 nlohmann::ordered_json section_facts(const voxdag_reader::ColorSection& section);
 // Adds the members `colors` and `attributes` with the section_facts() of each attribute of the
-// file. Materials also have their names.
+// file. For materials, also adds their names.
 void add_attribute_facts(const voxdag_reader::File& file, nlohmann::ordered_json& json);
 
 // Returns true if voxdag wrote the file and the file has the type that the command is about to

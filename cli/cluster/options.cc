@@ -33,8 +33,8 @@ ClusterOptions::MergeJobOptions merge_job(const BuildClusterOptions& cluster,
                                           const RunOptions& run) {
   ClusterOptions::MergeJobOptions job;
   job.arguments = own_arguments();
-  // Inserts the flag after the first word, which is the name of the command. It cannot be appended,
-  // because words after "--" are scenes.
+  // Inserts the flag after the first word, which is the name of the command. The flag cannot be
+  // appended, because words after "--" are scenes.
   job.arguments.insert(job.arguments.begin() + 1, kMergeJobFlag);
   job.folder = std::filesystem::current_path().string();
   if (run.memory_bytes > 0)
@@ -54,8 +54,8 @@ void take_allocation(RunOptions& run) {
   if (run.memory_bytes == 0 && given.memory_bytes > 0)
     run.memory_bytes = batch_budget(given.memory_bytes);
   if (run.threads == 0) run.threads = given.cpus;
-  // An earlier attempt at this job may still be ending on another node. Until it ends, it holds the
-  // lock of the build. So this process waits longer for the lock than other commands do.
+  // An earlier attempt of this job can still hold the lock of the build while it ends on another
+  // node. So this process waits longer for the lock than other commands do.
   run.lock_wait_s = 300;
   run.restart = false;
 }

@@ -20,8 +20,9 @@ std::optional<ClusterState> read_state(FileSystem& files, const std::string& wor
   }
 }
 
-// Prints the number of built batches, the unbuilt batches by the state of their tasks, and the
-// batches of each node. If a task of an unbuilt batch has failed, also prints one such failure.
+// Prints the number of built batches, the number of unbuilt batches for each state of their tasks,
+// and for each node the numbers of built and running batches. If a task of an unbuilt batch has
+// failed, also prints one such failure.
 void print(const ClusterState& cluster) {
   std::map<std::string, size_t> by_state, by_node;
   const OpenBatch* failed = nullptr;

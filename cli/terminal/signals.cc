@@ -66,9 +66,9 @@ void catch_signals(CancelToken& cancel) {
   struct sigaction hangup {};
   sigaction(SIGHUP, nullptr, &hangup);
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
-  // Ignores these two signals. By default, they end the process when it writes to a closed pipe or
-  // beyond the limit of file sizes. If they are ignored, the write fails, and the error is
-  // reported.
+  // By default, these two signals end the process when it writes to a closed pipe or beyond the
+  // limit of file sizes. If they are ignored, the write fails instead, and the command reports the
+  // error.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }

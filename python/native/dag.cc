@@ -196,7 +196,7 @@ std::vector<std::tuple<std::string, uint32_t, std::string>> attribute_types() {
   return all;
 }
 
-// Returns the names as bytes, because a scene may have names that are not UTF-8.
+// Returns the names as bytes, because a scene can have names that are not UTF-8.
 std::vector<nb::bytes> material_names(const query::DagFile& dag) {
   std::vector<nb::bytes> names;
   for (const std::string& name : dag.file().material_names())

@@ -7,7 +7,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kForDatabases = uint64_t{4} << 20;  // minimum of the space kept free
+constexpr uint64_t kForDatabases = uint64_t{4} << 20;  // minimum free space that uploads leave
 constexpr uint64_t kBallastBytes = uint64_t{1} << 20;  // size of the ballast file (disk_space.h)
 // Bytes that an upload reserves in one step.
 constexpr uint64_t kStepBytes = uint64_t{8} << 20;

@@ -34,7 +34,7 @@ class DiskSpace {
     ~Reservation();
     Reservation(const Reservation&) = delete;
     // Call this function before writing `bytes` bytes. If the reserved space is used up, reserves
-    // more. Throws Error{kNoSpace} if the disk no longer has that space.
+    // more. Throws Error{kNoSpace} if too little space is free for this.
     void use(uint64_t bytes);
 
    private:

@@ -1,5 +1,5 @@
 // Opens the databases of the data folder. Each database lists the files in some folders of the data
-// folder: queue.db the jobs, scenes.db the scenes.
+// folder: queue.db lists the jobs, and scenes.db lists the scenes.
 #pragma once
 
 #include <cstdint>

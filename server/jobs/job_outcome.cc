@@ -55,7 +55,7 @@ void apply_outcome(Job& job, const LiveJob& live, const ChildProcess::End& end,
     return finish(job, JobState::kSucceeded, now_s);
   }
   const JobError error = error_of(live, end, now_s);
-  // The stop signal may end a process before the process handles signals. Such a process sends no
+  // The stop signal can end a process before the process handles signals. Such a process sends no
   // failure message, but also counts as stopped.
   const bool stopped = asked && (error.code == "canceled" || !live.failure());
   if (!stopped) job.error = error;

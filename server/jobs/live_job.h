@@ -25,7 +25,7 @@ class LiveJob {
   // Memory limit of the job's process.
   uint64_t memory_bytes() const { return memory_bytes_; }
 
-  // Applies a message of the job's process. Its texts become printable and are cut if long.
+  // Applies a message of the job's process. Makes its texts printable, and cuts long texts.
   void apply(const Message& message);
   // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. Keeps the text
   // until the next message arrives.
@@ -39,7 +39,7 @@ class LiveJob {
   // Returns the result as JSON; "" before the job's process has reported one.
   std::string result() const { return locked(result_); }
 
-  // Requests a stop. Only the first call counts.
+  // Requests a stop. Further calls have no effect.
   void stop();
   // Returns the time (wall_seconds()) of the first call of stop(); 0 if stop() was not called.
   double stop_requested_s() const { return locked(stop_requested_s_); }

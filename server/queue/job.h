@@ -66,8 +66,8 @@ struct Job {
   Preview preview = Preview::kNone;
 };
 
-// One change of a job's state. `number` is the number of the event among the events of all
-// jobs, in the order in which they occurred.
+// One change of a job's state. The events of all jobs are numbered together, in the order in which
+// they occurred.
 struct JobEvent {
   int64_t number = 0;
   double at_s = 0;

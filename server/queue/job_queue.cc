@@ -187,8 +187,8 @@ void write_event(SqlDatabase& database, const Job& job) {
       .run();
 }
 
-// Returns the SQL condition for a list of states. The numbers of states are the only values in the
-// SQL text; all other values are bound.
+// Returns the SQL condition for a list of states. States are stored as numbers, so they need not be
+// bound as parameters.
 std::string states_in(const std::vector<JobState>& states) {
   std::string list;
   for (const JobState state : states)

@@ -86,7 +86,7 @@ class JobQueue {
   // Repairs states after a crash. `running` has the ids of the jobs whose processes are known to
   // run; these jobs are not changed. All other jobs in the state running are queued again, at the
   // front. All other jobs in the state canceling become canceled. A job that was interrupted often
-  // may itself cause the interruptions. Such a job is not queued at the front, waits for
+  // is possibly the cause of the interruptions. Such a job is not queued at the front, waits for
   // pause_s(attempt) seconds before each further attempt (1, 2, ...), and finally fails. Returns
   // the jobs that have ended by this call.
   std::vector<Job> recover(const std::set<std::string>& running,

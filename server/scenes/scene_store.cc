@@ -187,7 +187,8 @@ bool SceneStore::remove(const std::string& name) {
   const bool found = find(name).has_value();
   if (files_.exists(path(name))) {
     files_.rename(path(name), marked_path(name));
-    // Truncates the marked file. This frees the scene's space before the database must be written.
+    // Truncates the marked file. This frees the scene's space, so the database can then be written
+    // even on a full disk.
     files_.create(marked_path(name))->close();
   }
   drop_upload(name);

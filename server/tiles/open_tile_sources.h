@@ -1,7 +1,8 @@
-// Keeps the files that viewers requested last open, so that a request need not open and check them
-// again. The next request for a replaced file closes the old file. close_stale() closes removed,
-// replaced and idle files, so the owner must call it periodically. A file with an unreadable part
-// is opened again. Manifests remain in memory longer than files remain open. Thread-safe.
+// Keeps the files open that viewers requested most recently, so that a request need not open and
+// check them again. The next request for a replaced file closes the old file. close_stale() closes
+// removed, replaced and idle files, so the owner must call it periodically. A file with an
+// unreadable part is opened again. Manifests remain in memory longer than files remain open.
+// Thread-safe.
 #pragma once
 
 #include <list>

@@ -139,8 +139,8 @@ TEST_F(HostileView, RefusesRequestsOfOtherSites) {
     EXPECT_EQ(http_->get(path).header("Cross-Origin-Resource-Policy"), "same-origin") << path;
 }
 
-// If clients disconnect, the service stops their work, still answers other clients, and can be
-// stopped.
+// If clients disconnect, the service stops the work for them. It still answers other clients, and
+// can be stopped.
 TEST_F(HostileView, SurvivesClientsThatLeave) {
   start();
   std::string batch = "GET /api/v1/view/tiles/batch?v=" + digest_ + "&nodes=0.0";

@@ -167,8 +167,8 @@ TEST_F(KilledService, DrainsAndResumes) {
   EXPECT_EQ(end(SIGTERM), 0);
 }
 
-// A service that may open few files limits its connections, so that idle clients leave files for
-// other clients and for jobs.
+// A service that can open only few files limits its connections, so that idle clients leave files
+// for other clients and for jobs.
 TEST_F(KilledService, FewOpenFilesLeaveConnections) {
   max_files_ = 64;
   prepare();

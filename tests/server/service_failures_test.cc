@@ -377,7 +377,7 @@ TEST_F(ServiceFailures, AClockThatJumpedDeletesNothing) {
   EXPECT_TRUE(until([&] { return http_->get("/api/v1/jobs/" + id).status == 404; }));
 }
 
-// If the service with tokens listens on the network without TLS, it logs a warning, because others
+// If a service with tokens listens on the network without TLS, it logs a warning, because others
 // can read the tokens.
 TEST_F(ServiceFailures, WarnsOfTokensInPlainText) {
   const NewToken admin = make_token("admin", "a");

@@ -49,8 +49,8 @@ class SlowClients : public RunningService {
     }
     return total;
   }
-  // Returns the number of bytes in the kernel's send queues of the service's connections, which
-  // clients have not read.
+  // Returns the number of bytes in the kernel's send queues of the service's connections. Clients
+  // have not read these bytes.
   size_t queued_bytes() {
     std::ifstream table("/proc/net/tcp");
     std::string line;

@@ -33,8 +33,8 @@ std::string largest_batch(const std::string& version) {
   return path;
 }
 
-// Writes a scene whose root tile is as large as possible: all cubes of level 3 have voxels, and no
-// two of them are equal.
+// Writes a scene whose DAG has the largest possible root tile: all cubes of level 3 have voxels,
+// and no two of them are equal.
 void make_soup(const std::string& path) {
   const std::string command = std::string(VOXDAG_BINARY) + " generate soup " + path +
                               " --triangles 200000 --force >/dev/null 2>&1";

@@ -48,8 +48,8 @@ struct Context {
   CancelToken stopping = {};
   // Protects the scenes of jobs. A request that adds or retries a job holds this mutex while it
   // checks that the job's scenes exist and changes the queue. A request that replaces or removes a
-  // scene holds it while it checks that no job uses the scene and changes the store. So no scene
-  // disappears between the check and the change of the queue.
+  // scene holds the mutex while it checks that no job uses the scene and changes the store. So no
+  // scene disappears between the check and the change of the queue.
   std::mutex scene_mutex = {};
   // Scenes that dry runs are reading, guarded by scene_mutex. A client must not remove these
   // scenes. A client may replace them, because a reader keeps the old file open.

@@ -23,9 +23,10 @@ constexpr const char* kImmutable = "private, max-age=31536000, immutable";
 constexpr size_t kTagDigits = 32;
 // Limits for the address of a node above the bricks (docs/format.md).
 constexpr uint64_t kMaxLevel = 17, kMaxOffset = (uint64_t{1} << 40) - 1;
-// An answer of at least this many bytes holds its permit until it is sent, so that a client with
-// many large answers waits for its own answers. A smaller answer releases its permit before it is
-// sent, so that a client with a slow link does not delay other clients with the same token.
+// An answer of at least this many bytes holds its permit until it is sent. So a client with many
+// large answers uses up its own permits and delays only itself. A smaller answer releases its
+// permit before it is sent. So a client with a slow link does not delay other clients with the same
+// token.
 constexpr size_t kLargeAnswer = 512 << 10;
 // Limits for the level of a color page, and for its position.
 constexpr uint64_t kMaxColorLevel = 20, kMaxPage = (uint64_t{1} << 17) - 1;
@@ -57,8 +58,8 @@ std::vector<uint32_t> make_tile(const TileSource& dag, const query::TileAddress&
     throw;
   } catch (const Error& error) {
     if (!error.is_corruption()) throw;
-    // Damage of the file has a different type, DamagedBlock. So this error means that no node is at
-    // the offset.
+    // Damage of the file causes an exception of another type, DamagedBlock. So this error means
+    // that no node is at the offset.
     throw not_found(error.message());
   }
 }

@@ -174,7 +174,7 @@ void Connection::allow_large_send_buffer() {
 #endif
 }
 
-// Uses poll() instead of a read: unread bytes, such as the last bytes of a TLS session, may precede
+// Uses poll() instead of a read: unread bytes, such as the last bytes of a TLS session, can precede
 // the end of the stream, and a read would return them instead of the end.
 bool Connection::peer_disconnected() const {
   pollfd peer{socket_, POLLRDHUP, 0};

@@ -5,8 +5,8 @@
 //   - waiting: the next request must begin within idle_timeout_s
 //   - header: the header must be complete within header_timeout_s
 //   - exchange: the client must send the body, and receive the answer, at min_bytes_per_s or
-//     faster; it may be up to grace_s behind this rate. Only the content of the body counts as
-//     progress, not the lines around its chunks
+//     faster. The client may be up to grace_s behind this rate. Only the content of the body counts
+//     as progress, not the lines around its chunks
 //
 // Only the time in which the connection waits for its client counts, except after limit_request().
 // If a client exceeds its time, the connection enters an error state, in which reads fail. While a
@@ -60,7 +60,8 @@ class Connection {
   // Makes linger() do nothing, because the client may send without end.
   void close_without_linger() { lingers_ = false; }
 
-  // Returns the next bytes, at least one unless in an error state. Valid until the next call.
+  // Returns the next bytes: at least one byte, or none in an error state. The result is valid until
+  // the next call.
   std::string_view read(uint64_t max_bytes);
   // Appends the bytes up to and including the next LF. Returns false in an error state, or if
   // `text` would become longer than `max_bytes`. The bytes do not count as progress of a body.

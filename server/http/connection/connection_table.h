@@ -1,7 +1,7 @@
-// The open connections, and the memory of the answers that they send, within their limits. If the
-// table is full, a new connection replaces the connection that has waited longest for its client.
-// If the memory is used up, a new answer replaces the answer that has waited longest. So clients
-// that send or read little or nothing cannot keep other clients out. Thread-safe.
+// The open connections. The table limits their number and the memory of the answers that they send.
+// If the table is full, a new connection replaces the connection that has waited longest for its
+// client. If the memory is used up, a new answer replaces the answer that has waited longest. So
+// clients that send or read little or nothing cannot keep other clients out. Thread-safe.
 #pragma once
 
 #include <condition_variable>

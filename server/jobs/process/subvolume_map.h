@@ -23,9 +23,9 @@ class SubvolumeMap {
   void split(int64_t id, std::span<const SubvolumeStatus> parts);
 
   const SubvolumeTotals& totals() const { return totals_; }
-  // Returns the contents of subvolumes.json. A cube has its low corner and edge, in voxels, and 1
-  // if it is built, else 0. "origin" and "edge" are the low corner and the edge of the grid, in
-  // scene units.
+  // Returns the contents of subvolumes.json. An entry of "cubes" has the low corner and the edge of
+  // a subvolume, in voxels, and 1 if it is built, else 0. "origin" and "edge" are the low corner
+  // and the edge of the grid, in scene units.
   //   {"resolution": R, "built": n, "total": n, "cubes": [[x, y, z, edge, built], ...],
   //    "working": [[x, y, z, edge], ...], "origin": [x, y, z], "edge": e}
   std::string json() const;

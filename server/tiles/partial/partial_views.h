@@ -24,8 +24,8 @@ class PartialViews {
   // Returns the built subvolumes as the tiles of a DAG of the job's grid. Throws like json().
   std::shared_ptr<const TileSource> tiles(const std::string& job, const JobFolder& folder,
                                           uint64_t resolution);
-  // Returns the previous result of tiles() if the job's view still has it and it has this digest;
-  // otherwise null. Does not read the job's folder.
+  // Returns the previous result of tiles() if the job's view still has this result and the digest
+  // is the same; otherwise null. Does not read the job's folder.
   std::shared_ptr<const TileSource> known(const std::string& job, const std::string& digest);
   // Drops the view of a job that was deleted or restarted. Requests in progress can finish.
   void close(const std::string& job);

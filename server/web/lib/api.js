@@ -10,7 +10,7 @@ export class Problem extends Error {
     this.members = members;
     this.headers = headers;
   }
-  // True if the same request may succeed later.
+  // True if the same request can succeed later.
   get isTransient() {
     return this.code === "unreachable" || [408, 429, 502, 503, 504].includes(this.status);
   }

@@ -118,7 +118,7 @@ export class Camera {
     if (depth > kMinDistance) this.target = add(this.eye, scale(forward, depth));
   }
 
-  // Returns the point on the ray through a pixel that has the same depth as the target.
+  // Returns the point at the depth of the target on the ray through a pixel.
   pointAtTarget(x, y, width, height) {
     const direction = this.direction(x, y, width, height);
     return add(this.eye, scale(direction, this.distance / dot(direction, this.axes().forward)));

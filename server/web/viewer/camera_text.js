@@ -1,7 +1,7 @@
 // Converts a camera to text and back: to the options of `voxdag render`, in scene units, and to the
 // members of a URL fragment.
 
-const kDigits = 3;  // decimal places of a voxel
+const kDigits = 3;  // decimal places of a position in voxels
 
 const numberText = (value) => String(Number(value.toPrecision(6)));
 

@@ -23,7 +23,7 @@ export class TileError extends Error {
     super(detail);
     Object.assign(this, {status, code, retryAfterMs, timedOut});
   }
-  // True if the same request may succeed later.
+  // True if the same request can succeed later.
   get isTransient() {
     if (this.code === "corrupt" || this.code === "unsupported_version") return false;
     return this.status === 0 || this.status === 408 || this.status === 429 || this.status >= 500;
@@ -37,12 +37,12 @@ export class TileError extends Error {
     return (this.status === 503 || this.status === 429) &&
         (this.code === "busy" || this.retryAfterMs > 0);
   }
-  // True if the complete file may be missing.
+  // True if something was not found: one tile, or the complete file.
   get isMissing() {
     return this.status === 404 || this.status === 409;
   }
-  // True if one of the requested items may have caused the error, although the service does not
-  // report so.
+  // True if one of the requested items possibly caused the error, although the service does not
+  // report this.
   get isSuspicious() {
     return this.status === 200 || (this.status === 500 && this.isTransient);
   }

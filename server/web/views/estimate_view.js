@@ -6,7 +6,7 @@ import {countText, durationText, rangeText, shortCount, sizeText} from "../lib/f
 
 import {problemBox} from "./parts.js";
 
-const kDebounceMs = 700;  // after the last change
+const kDebounceMs = 700;  // pause between the last change and the request
 const kMaxAttempts = 5;   // attempts while the service is busy with other plans
 
 const kFigures = [

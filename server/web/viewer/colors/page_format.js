@@ -15,10 +15,11 @@ function countBits(word) {
   return bits;
 }
 
-// Returns the words of complete blocks; no words for a page without cells. The first block has the
-// page's first word, three numbers of 10 bits each (the number of cells before the second, the
-// third and the fourth group of 128 cells), two words of 0, the mask, the addresses of up to 12
-// more blocks (filled in later), and 8 texels of colors. Each other block has 16 texels of colors.
+// Returns the words of complete blocks; no words for a page without cells. The first block begins
+// with the page's first word. The second word has three numbers of 10 bits: the number of occupied
+// cells before the second, the third and the fourth group of 128 cells. Then follow two words of 0,
+// the mask, the addresses of up to 12 more blocks (filled in later), and 8 texels of colors. Each
+// other block has 16 texels of colors.
 export function decodePage(page) {
   const count = page[0] & 1023, skip = page[0] >>> 16 & 31, single = (page[0] & kSingle) !== 0;
   if (page.length === 1 && page[0] === 0) return new Uint32Array(0);

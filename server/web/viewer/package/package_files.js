@@ -47,8 +47,8 @@ export class PackageFiles {
   // Resolves to a range of a file, fetched by a range request. Resolves to null if the server does
   // not answer with this range.
   async readRange(file, offset, length, {signal, cache}) {
-    // Until a range request has succeeded, all others wait for it: a server without ranges would
-    // answer each of them with the complete file.
+    // Until a range request has succeeded, all other range requests wait for it. Otherwise a server
+    // without ranges would answer each of them with the complete file.
     if (!this.rangesAreProven) {
       while (this.probe) await this.probe;
       if (!this.hasRanges) return null;

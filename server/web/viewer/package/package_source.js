@@ -88,8 +88,8 @@ export class PackageSource {
   }
 
   // Resolves to a list with the words of each tile of `nodes`, in the same order. If the block of a
-  // tile is missing or damaged, its element is a TileError instead. Throws TileError if the server
-  // does not answer.
+  // tile is missing or damaged, the tile's element is a TileError instead. Throws TileError if the
+  // server does not answer.
   fetchTiles(nodes, options = {}) {
     return this.fetchItems(nodes, options, async ({level, offset}) => {
       const band = this.bandOf(level, "tiles");

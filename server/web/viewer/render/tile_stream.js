@@ -14,7 +14,7 @@ const kMinPoolBytes = 4 << 20;  // size of the pool for the smallest file
 const kMaxFirstWaitMs = 400;  // maximum time that the first frame waits for the first view's tiles
 
 export class TileStream {
-  // `options` are the renderer's options; `color` decides whether color pages are loaded.
+  // `options` are the renderer's options. Color pages are loaded only if options.color is true.
   // onArrival() is called when a tile or page has arrived. onArrival(true) is called when a request
   // has failed or the state of retries has changed.
   constructor(gl, source, info, options, budgetBytes, onArrival) {

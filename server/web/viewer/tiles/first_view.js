@@ -82,16 +82,16 @@ export class FirstView {
       this.walk(store, tile, words, corner);  // tile is undefined if it was evicted
   }
 
-  // True if a cube may be in the picture and the cells in it are too wide. `cell` is the cells'
-  // edge in voxels. A ball with 0.867 (just over √3/2) times the cube's edge as radius contains the
-  // cube.
+  // True if a cube is possibly in the picture and the cells in it are wider than kPixels. `cell` is
+  // the cells' edge in voxels. A ball around the cube's center contains the cube if its radius is
+  // 0.867 (just over √3/2) times the cube's edge.
   needs(x, y, z, edge, cell) {
     return this.pixelsOf(x, y, z, edge, cell) > kPixels &&
         this.isSeen(x + edge / 2, y + edge / 2, z + edge / 2, edge * 0.867);
   }
 
-  // Returns the width in pixels of a cell with the edge `cell` at the point of a cube that is
-  // nearest to the eye.
+  // Returns the width in pixels that a cell with the edge `cell` has at the distance of a cube
+  // (from the eye to the nearest point of the cube).
   pixelsOf(x, y, z, edge, cell) {
     const [ex, ey, ez] = this.view.eye;
     const far = Math.hypot(
@@ -100,7 +100,7 @@ export class FirstView {
     return cell / Math.max(far * this.pixel, 1e-9);
   }
 
-  // True if a part of a ball may be in the picture.
+  // True if a part of a ball is possibly in the picture.
   isSeen(x, y, z, radius) {
     const {eye, forward, right, up} = this.view, dx = x - eye[0], dy = y - eye[1], dz = z - eye[2];
     const along = (axis) => axis[0] * dx + axis[1] * dy + axis[2] * dz;

@@ -6,7 +6,7 @@ export const kTexelWords = 4;
 export const kBlockTexels = 16;  // in the pool; no node or leaf crosses the end of a block
 const kMagic = 0x31544456;
 const kHeadWords = 4;
-const kCutWords = 4;  // of a cut-off node in a tile
+const kCutWords = 4;  // words of a cut-off node in a tile
 const kMaxOffset = 2 ** 40 - 1;
 
 const kPopcount = Uint8Array.from({length: 256}, (_, i) => {

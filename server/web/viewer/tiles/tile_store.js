@@ -17,7 +17,7 @@ import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js
 // evicted, because the view possibly still uses them.
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
-const kFreeShare = 1 / 64;  // share of the pool that is freed when tiles are evicted
+const kFreeShare = 1 / 64;  // share of the pool that an eviction frees in addition
 
 // Returns a unique number for a node. Offsets are below 2^40.
 export function keyOf(level, offset) {

@@ -83,7 +83,7 @@ TEST_F(ViewedFilesTest, HaveManifestsThatOutliveThem) {
 }
 
 // After a read of a file has failed, the next open() maps the file again instead of returning the
-// shared object, because the file may be readable again.
+// shared object, because the file is possibly readable again.
 TEST_F(ViewedFilesTest, AreOpenedAgainIfTheyCouldNotBeRead) {
   class SameIdentity : public ForwardingFiles {
     struct Reader : ForwardingReader {
