@@ -61,7 +61,7 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
   const GeometryOptions& g = spec.geometry;
   if (g.resolution || !g.voxel_size) return spec;
   BuildSpec out = spec;
-  out.geometry.resolution = kMaxOptionEdge;  // any valid value, for checked()
+  out.geometry.resolution = kMaxOptionEdge;  // checked() accepts any valid value
   const BuildSpec full = checked(out);
   MemoryBudget budget(full.run.memory_bytes);
   const auto scene =

@@ -284,7 +284,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     job.work.remove_merged();
     return true;
   }
-  bool reads_scene = false;  // if true, an error may come from the scene's files
+  bool reads_scene = false;  // if true, an error can come from the scene's files
   try {
     enclose(job);
     GlobalFileWriter out(job.context.files, job.report.output, job.report.grid,
@@ -405,7 +405,7 @@ void resumable(BuildJob& job, const std::function<void()>& stages) {
 }
 
 // Runs the build as the cluster's merge job. A job that was submitted twice, or restarted by Slurm,
-// may find the build already finished.
+// can find that the build is already finished.
 void run_as_merge_job(BuildJob& job, double start_s) {
   const auto merge_job = make_merge_job(job.spec, job.scene.open(), job.context);
   if (const auto report = merge_job->finished()) {

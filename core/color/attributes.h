@@ -76,7 +76,7 @@ struct AttributeTraits {
   Encoding encoding;
   bool uses_images = false;       // depends on the scene's textures
   const char* ply_properties[3];  // names of a value's components
-  // value_of_cell() returns the value of a cell of the finest level, from its baked sums.
+  // value_of_cell() returns the value of a cell of the finest level, from the sums of its surfaces.
   // value_of_parent() returns the value of a coarser cell from its set children. Both are null for
   // colors, which are encoded from the cells' sums.
   uint32_t (*value_of_cell)(const ColorSum& sum, const CellValues& values) = nullptr;

@@ -57,7 +57,7 @@ struct Material {
   // Base color (linear) and alpha. kFullIntensity stands for 1.
   std::array<uint16_t, 4> factor{kFullIntensity, kFullIntensity, kFullIntensity, kFullIntensity};
   AlphaMode alpha_mode = AlphaMode::kOpaque;
-  uint16_t alpha_cutoff = kFullIntensity / 2;  // for kMask
+  uint16_t alpha_cutoff = kFullIntensity / 2;  // used if alpha_mode is kMask
   uint32_t image = kNoImage;                   // index into SceneMaterials::images
   std::array<Wrap, 2> wrap{Wrap::kRepeat, Wrap::kRepeat};
 

@@ -17,8 +17,9 @@ namespace voxdag {
 namespace {
 
 constexpr uint64_t kAvifStateBytes = uint64_t{16} << 20;
-// Bytes of memory per pixel, for channels of up to 8 bits and of more bits: the decoder's planes,
-// its state per block, and a second set of planes for images that consist of several tiles.
+// Bytes of memory per pixel. kBytesPerPixel is for channels of up to 8 bits, kBytesPerWidePixel for
+// channels of more bits. Both include the decoder's planes, its state per block, and a second set
+// of planes for images that consist of several tiles.
 constexpr uint64_t kBytesPerPixel = 16, kBytesPerWidePixel = 28;
 // The decoder gets a limit for the number of pixels: the number in the image, but at least
 // kMinSizeLimit. A damaged file can make the decoder allocate memory for as many pixels as the

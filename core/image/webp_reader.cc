@@ -74,8 +74,9 @@ class WebpReader : public ImageReader {
     check(WebPDecode(file_.bytes().data(), file_.bytes().size(), &config));
   }
 
-  // Returns an upper bound of the memory that libwebp allocates: rows of blocks and, for lossless
-  // images and alpha, all pixels, the images of the transforms, and decoding tables.
+  // Returns an upper bound of the memory that libwebp allocates. This memory is for rows of blocks.
+  // For lossless images and alpha, it is also for all pixels, the images of the transforms, and
+  // decoding tables.
   uint64_t decoder_bytes() const {
     const uint64_t pixels = uint64_t{width_} * height_;
     uint64_t bytes = kWebpStateBytes + uint64_t{256} * width_;

@@ -31,7 +31,7 @@ class BitReader {
 
  private:
   const std::span<const uint8_t> bytes_;
-  size_t at_ = 0;  // in bits
+  size_t at_ = 0;  // position of the next bit
 };
 
 // A canonical prefix code. A code of one symbol has no bits.
@@ -186,7 +186,7 @@ std::optional<uint64_t> webp_table_bytes(std::span<const uint8_t> stream, uint32
                                          uint32_t height) {
   try {
     BitReader bits(stream);
-    uint32_t seen = 0;  // types of transforms
+    uint32_t seen = 0;  // a bit for each type of transform read so far
     while (bits.read(1)) read_transform(bits, width, height, seen);
     const uint32_t cache = cache_size(read_cache_bits(bits));
     uint64_t sets = 1;

@@ -48,7 +48,7 @@ class TemporaryFolder {
  public:
   TemporaryFolder(FileSystem& files, const std::string& parent) : files_(files) {
     remove_abandoned(parent);
-    // Until the folder is locked, another task may consider it abandoned and remove it.
+    // Until the folder is locked, another task can consider it abandoned and remove it.
     for (int attempt = 0; !lock_ && attempt < 100; ++attempt) {
       path_ = make_temporary_folder(parent + "/" + std::string(kTemporaryName));
       try {

@@ -9,12 +9,13 @@
 namespace voxdag {
 
 // Computes the rows of `parts`, octants of the subvolume `whole`, adds them to `rows`, and saves
-// `rows`. `whole` must have voxels of the shell, and `triangles` are its triangles. Charges the
-// rows of `whole` and of a part to `budget`. Throws Error{kOutOfMemory}.
+// `rows`. `triangles` are the triangles of `whole`. At least one of them must touch a voxel of
+// `whole`. Charges the rows of `whole` and of a part to `budget`. Throws Error{kOutOfMemory}.
 void add_part_rows(SolidRows& rows, const Cube& whole, std::span<const Cube> parts,
                    TriangleStream& triangles, MemoryBudget& budget, const CancelToken& cancel);
 
-// Returns the views from the corners of an empty cube. `entry` has the views from its low faces.
+// Returns the views (core/geometry/solid_rule.h) from the corners of an empty cube. `entry` has the
+// views from its low faces.
 UnitViews views_of_empty(const SolidEntry& entry, const Cube& cube, uint32_t grid_levels);
 
 }  // namespace voxdag

@@ -10,7 +10,8 @@
 
 namespace voxdag {
 
-// Returns the sample rows of a cube. Their `low` is the cube's low corner, in lattice units.
+// Returns the sample rows of a cube. Their `low` is the cube's low corner, in lattice units (1/256
+// voxel).
 SampleRows sample_rows_of(const Cube& cube, uint32_t grid_levels);
 // Returns the number of a cube's sample rows along one axis, including the rows on its faces.
 uint64_t rows_per_axis(const Cube& cube, uint32_t grid_levels);
@@ -39,12 +40,12 @@ class RowSums {
   RowSums(const Cube& cube, uint32_t grid_levels, MemoryBudget& budget);
   void add(const FixedTriangle& triangle);
   const std::vector<int32_t>& numbers(int axis) const { return numbers_[axis]; }
-  // True if a triangle touches the cube, so that the cube has a voxel of the shell.
+  // True if a triangle touches the cube.
   bool is_occupied() const { return is_occupied_; }
 
  private:
   const SampleRows rows_;
-  const int64_t edge_;  // in lattice units
+  const int64_t edge_;  // the cube's edge in lattice units
   const MemoryCharge charge_;
   std::vector<int32_t> numbers_[3];
   bool is_occupied_ = false;

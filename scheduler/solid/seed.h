@@ -14,7 +14,7 @@
 namespace voxdag {
 
 struct Seed {
-  CubeVoxel voxel{};    // in the grid
+  CubeVoxel voxel{};    // the voxel of the grid that contains the point
   std::string text;     // the point as "X,Y,Z"
   uint32_t radius = 0;  // GeometryOptions::radius
 };
@@ -33,8 +33,8 @@ std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cu
 // positions. `radius` is V, and `grid_levels` are the levels of the grid of the voxels.
 CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels);
 
-// Throws Error{kInvalidInput}: the seed's voxel, or a voxel of the cube that starts there, is in
-// the shell.
+// Throws Error{kInvalidInput}: the seed's voxel, or a voxel of the cube that starts there, is
+// touched by a triangle.
 [[noreturn]] void refuse_seed_in_shell(const Seed& seed);
 
 }  // namespace voxdag

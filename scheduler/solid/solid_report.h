@@ -16,7 +16,8 @@ namespace voxdag {
 // the function adds the voxels of rows.full_cubes.
 SolidReport solid_report(const SolidRows& rows, uint64_t interior, uint64_t disputed);
 
-// Returns the report of an enclosed solid, without the volume. `shell`: voxels of the shell.
+// Returns the report of an enclosed solid, without the volume. `shell`: number of voxels that
+// triangles touch.
 SolidReport enclosed_report(uint64_t voxels, uint64_t shell);
 
 // Returns the volume of these voxels, in cubic units of the scene.

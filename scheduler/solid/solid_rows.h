@@ -1,13 +1,14 @@
-// The durable state of a solid between the stages `rows`, `build` and `merge`: for each subvolume,
-// the views (core/geometry/solid_rule.h) from its low faces; and the full cubes.
+// The durable state of a solid between the stages `rows`, `build` and `merge`. It consists of the
+// views (core/geometry/solid_rule.h) from the low faces of each subvolume, and of the full cubes
+// (FullCube). The *shell* consists of the voxels that triangles touch.
 //
-//   header    magic, place of the last index, checksum
+//   header    magic, offset of the last index, checksum
 //   rows      compressed views of one subvolume along one axis
-//   index     the job, the subvolumes with the places of their rows, the full cubes, the counts
+//   index     the job, the subvolumes with the extents of their rows, the full cubes, the counts
 //
 // The triangles of built subvolumes are freed, so the views cannot be computed again once a
 // subvolume is built. save() makes everything durable: it appends an index, and then replaces the
-// header, which has the place of the last index. Thread-safe, except load() and start().
+// header, which has the offset of the last index. Thread-safe, except load() and start().
 #pragma once
 
 #include <array>

@@ -1,15 +1,16 @@
 // Artifacts shared between builds. If the content of a subvolume was built before, in any place of
 // any grid, its artifact is copied instead of built.
 //
-// The key is the SHA-256 of the canonical content: the snapped triangles relative to the cube
-// (corners sorted within each triangle, triangles sorted, duplicates removed), the cube's edge, the
-// hash bits, the rule, and a version that increases whenever artifacts change. For a solid, the
-// triangles keep their orientation and their duplicates, and the content has the rule of the solid
-// and the views from the low faces of the cube (SolidEntry). The views are the only data from
-// outside the cube on which the voxels of a subvolume depend. The cache is a
-// folder with one file per entry. When the limit is exceeded, the least recently used entries are
-// removed. Several builds may share the cache: entries appear atomically, by renaming, and a
-// removed or damaged entry is a miss. Thread-safe.
+// The key is the SHA-256 of the canonical content. The content has the snapped triangles relative
+// to the cube. The corners within each triangle are sorted, the triangles are sorted, and
+// duplicates are removed. The content also has the cube's edge, the hash bits, the rule, and a
+// version that increases whenever artifacts change. For a solid, the triangles keep their
+// orientation and their duplicates, and the content has the rule of the solid and the views from
+// the low faces of the cube (SolidEntry). The views are the only data from outside the cube on
+// which the voxels of a subvolume depend. The cache is a folder with one file per entry. When the
+// limit is exceeded, the least recently used entries are removed. Several builds may share the
+// cache: entries appear atomically, by renaming, and a removed or damaged entry is a miss.
+// Thread-safe.
 #pragma once
 
 #include <atomic>

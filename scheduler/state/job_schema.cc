@@ -79,7 +79,7 @@ void check_integrity(SqlDatabase& database) {
   auto check = database.prepare("PRAGMA integrity_check(1)");
   std::string found = check.step() ? check.text(0) : "no answer";
   if (found == "ok") return;
-  // SQLite's text may begin with a heading.
+  // SQLite's text can begin with a heading.
   if (found.starts_with("***")) found.erase(0, found.find('\n') + 1);
   throw Error(ErrorCode::kCorrupt, "it is damaged (" + found + ")");
 }

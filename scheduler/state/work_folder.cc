@@ -72,7 +72,8 @@ bool is_ours(const DirectoryEntry& entry) {
 WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max_wait_s)
     : files_(context.files), path_(std::move(path)) {
   const std::string lock_path = path_ + "/" + std::string(kLockName);
-  // A build that is ending removes the folder, so it may have to be created again.
+  // A build that is ending removes the folder, so each try creates the folder again if it is
+  // missing.
   const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
     files_.make_directories(path_);
     check_is_ours();

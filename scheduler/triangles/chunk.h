@@ -3,7 +3,7 @@
 // chunks, and any number of threads may read the list when it is complete.
 //
 // A record has nine coordinates of 32 bits (36 bytes). If the build's options give the grid's
-// bounds, triangles may extend far beyond the grid. Their coordinates then have 64 bits ("wide", 72
+// bounds, triangles can extend far beyond the grid. Their coordinates then have 64 bits ("wide", 72
 // bytes).
 #pragma once
 
@@ -30,7 +30,7 @@ struct Chunk {
   uint64_t first = 0;  // number of records in the list before this chunk
 };
 
-// Memory per entry of a growing list of chunks. A growing vector may have room for twice its
+// Memory per entry of a growing list of chunks. A growing vector can have room for twice its
 // entries.
 inline constexpr uint64_t kChunkListBytes = 2 * sizeof(Chunk);
 

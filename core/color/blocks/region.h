@@ -1,8 +1,8 @@
 // Encodes the colors of a region as the file stores them. The cells of the region's finest level
-// come first, in Morton order, then the cells of the next coarser level, and so on up to the one
-// cell that is the region. The cells are stored in blocks of 32; each region begins a new block.
-// The sum of a coarser cell is the sum of its children. The color of a coarser cell is computed
-// from this sum, not from the stored colors of the children.
+// come first, in Morton order. The cells of the next coarser level follow, and so on. The last cell
+// is the region itself. The cells are stored in blocks of 32; each region begins a new block. The
+// sum of a coarser cell is the sum of its children. The color of a coarser cell is computed from
+// this sum, not from the stored colors of the children.
 #pragma once
 
 #include <array>

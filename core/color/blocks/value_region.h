@@ -15,7 +15,7 @@ namespace voxdag {
 // A cell with a value for one attribute.
 struct ValuedCell {
   uint32_t code = 0;   // Morton code within the region
-  uint32_t value = 0;  // below 256^bytes
+  uint32_t value = 0;  // below 256^bytes (see encode_values())
 };
 
 // Encodes a region, as encode_region() does for colors, and leaves `total` zero. `bytes` is the

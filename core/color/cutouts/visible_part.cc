@@ -12,8 +12,8 @@ namespace {
 
 // A polygon covers a texel if it reaches at least this deep into the texel, in texels.
 constexpr double kDepth = 0x1p-16;
-// sight() enlarges the cube by kCubeMargin lattice units, and the polygon's box by kBoxMargin
-// texels. Both exceed all rounding errors.
+// sight() enlarges the cube by kCubeMargin lattice units (1/256 voxel), and the polygon's box by
+// kBoxMargin texels. Both exceed all rounding errors.
 constexpr double kCubeMargin = 0x1p-4, kBoxMargin = 0x1p-10;
 // If rounding leaves no polygon in a voxel, the voxel is enlarged by this many lattice units.
 constexpr double kVoxelMargin = 0x1p-6;
@@ -232,9 +232,9 @@ VisiblePart::Outline VisiblePart::outline_of(const Polygon& polygon,
   return out;
 }
 
-// Returns the smallest block that contains the polygon and a margin around it; the block of the
-// last level if no block does. covers() has the same result for this block as for all larger blocks
-// that contain it, because the polygon does not reach the other parts of those blocks.
+// Returns the smallest block that contains the polygon and a margin around it. If no block contains
+// them, returns the block of the last level. The polygon does not reach beyond the returned block.
+// So covers() has the same result for this block as for every larger block that contains it.
 VisiblePart::Block VisiblePart::block_around(const Outline& outline) const {
   const uint32_t size[2] = {mask_->width(), mask_->height()};
   uint32_t first[2], last[2];

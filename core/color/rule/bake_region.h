@@ -61,8 +61,9 @@ class RegionBaker {
         spread_[a][k] = static_cast<uint32_t>(spread_bits3(k) << (2 - a));
   }
 
-  // `region`: a cube of at most 64^3 color cells. `triangles`: all triangles that may touch
-  // `region`, at most 2^32. Sets `cells` to the cells that the triangles touch, in Morton order.
+  // `region`: a cube of at most 64^3 color cells. `triangles`: at most 2^32 triangles, which
+  // include all triangles that touch `region`. Sets `cells` to the cells that the triangles touch,
+  // in Morton order.
   void bake(const Cube& region, std::span<const FixedSurface> triangles,
             std::vector<ColoredCell>& cells) {
     begin(region);
@@ -290,7 +291,7 @@ class RegionBaker {
     return spread_[0][position[0] - first_[0]] | spread_[1][position[1] - first_[1]] |
            spread_[2][position[2] - first_[2]];
   }
-  // Returns the center of a cell in lattice units.
+  // Returns the center of a cell in lattice units (1/256 voxel).
   std::array<int64_t, 3> center_of(uint32_t code) const {
     uint32_t at[3];
     morton_decode(code, at[0], at[1], at[2]);
@@ -304,7 +305,7 @@ class RegionBaker {
   const std::span<const Material> materials_;
   Textures& textures_;
   const Cutouts* const cutouts_;
-  uint32_t spread_[3][64];  // [axis][coordinate]: the coordinate's bits in a code
+  uint32_t spread_[3][64];  // [axis][coordinate]: the coordinate's bits in a Morton code
   std::span<const FixedSurface> triangles_;
   uint32_t max_cells_ = 0;
   int64_t first_[3] = {}, last_[3] = {};  // range of the region's cells, by axis

@@ -85,7 +85,7 @@ struct CellTriangle {
   };
 
   int axis[3];
-  int cell_bits;    // log2 E
+  int cell_bits;    // log2 of the cell's edge E in lattice units (1/256 voxel)
   int64_t v[3][3];  // [vertex][permuted axis]
   Int normal[3];    // all 0 if the triangle is degenerate
   double slope[2];  // rise along axis 2 per unit of axes 0 and 1; only for estimates

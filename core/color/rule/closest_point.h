@@ -42,7 +42,7 @@ VOXDAG_HD inline double closest_on_segment(const Vector& a, const Vector& b, dou
 
 // Returns the projection of `center` on the triangle's plane if the triangle contains this point.
 // Otherwise returns the closest point of the edges (on ties, of the first edge). `center`: the
-// cell's center in lattice units.
+// cell's center in lattice units (1/256 voxel).
 VOXDAG_HD inline SurfacePoint closest_point(const FixedTriangle& triangle,
                                             const std::array<int64_t, 3>& center) {
   constexpr double kOne = static_cast<double>(kPointOne);

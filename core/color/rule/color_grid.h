@@ -15,10 +15,10 @@ namespace voxdag {
 inline constexpr uint32_t kRegionLevels = 6;
 
 struct ColorGrid {
-  uint32_t levels = 2;        // L; R = 2^L
-  uint32_t color_levels = 2;  // c; K = 2^c, 2 <= c <= L
+  uint32_t levels = 2;        // L, the levels of the voxel grid: R = 2^L
+  uint32_t color_levels = 2;  // c, the level of the color cells: K = 2^c, 2 <= c <= L
 
-  // log2 of a color cell's edge in lattice units: 8 to 26.
+  // log2 of a color cell's edge in lattice units (1/256 voxel): 8 to 26.
   VOXDAG_HD int cell_bits() const { return kUnitBits + static_cast<int>(levels - color_levels); }
   // Returns the level of full regions, or 0 if the complete grid is smaller than a full region.
   VOXDAG_HD uint32_t region_level() const {

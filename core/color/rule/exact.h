@@ -18,8 +18,8 @@ namespace voxdag::color {
 template <class Int>
 using UnsignedOf = std::conditional_t<sizeof(Int) == 8, uint64_t, uint128>;
 
-// Products and sums modulo 2^64 (for int128, 2^128). They are for expressions whose intermediate
-// values may not fit in Int but whose result does.
+// Products and sums modulo 2^64 (for int128, 2^128). They are for expressions whose result fits in
+// Int, although intermediate values can exceed the range of Int.
 template <class Int>
 VOXDAG_HD inline Int wrapping_product(Int a, Int b) {
   return static_cast<Int>(static_cast<UnsignedOf<Int>>(a) * static_cast<UnsignedOf<Int>>(b));

@@ -42,7 +42,7 @@ class MaterialSums {
   }
   void clear() {
     materials_.clear();
-    further_ = {};  // frees the memory, which may be large
+    further_ = {};  // frees the memory, which can be large
     max_further_ = kFewFurther;
   }
   uint64_t bytes() const {

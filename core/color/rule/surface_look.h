@@ -35,9 +35,9 @@ VOXDAG_HD inline SurfacePoint surface_point(double second, double third) {
 }
 
 // Returns the level of the image's pyramid that has one to two texels along the edge of a color
-// cell, on average over the triangle. This is the largest existing level l with 4^l <= t / c, where
-// t is the number of texels of level 0 in the triangle, and c is the triangle's area in square
-// color cells.
+// cell, on average over the triangle. Let t be the number of texels of level 0 in the triangle, and
+// c the triangle's area in square color cells. The result is the largest existing level l with 4^l
+// <= t / c.
 //
 // `area` is twice the triangle's area in square lattice units (1/256 voxel). If it is 0, t is the
 // square of the longest edge in texels, and c is the square of the longest edge in color cells,

@@ -178,8 +178,9 @@ class TouchedCells {
   const CellRange& range_;
   Int margin_[3];    // an edge function's maximum minus its minimum over a cell
   Int rise_, fall_;  // the plane's rise and fall over a cell, along axes 0 and 1
-  // The first and the last cell that the plane touches in the current column of cells, the highest
-  // value of the plane in the first cell, and the lowest value in the last cell.
+  // first_ and last_ are the first and the last cell that the plane touches in the current column
+  // of cells. highest_ is the highest value of the plane's function in the first cell, and lowest_
+  // is the lowest value in the last cell.
   int64_t first_ = 0, last_ = 0;
   Int highest_ = 0, lowest_ = 0;
 };

@@ -59,7 +59,7 @@ struct FrameInfo {
   uint64_t first_row = 0;
   uint64_t first_child = 0;  // number of children of all earlier rows of the level
   uint64_t first_hash = 0;   // truncated hash of the frame's first row
-  uint64_t offset = 0;       // first byte in the segment
+  uint64_t offset = 0;       // offset of its first byte in the segment
   uint32_t bytes = 0;        // stored size
   uint32_t rows = 0;
   uint32_t children = 0;

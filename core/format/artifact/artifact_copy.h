@@ -36,7 +36,7 @@ struct CacheEntry {
   std::unique_ptr<ReadableFile> file;
   ArtifactRef ref;
   ArtifactRoot root;       // the artifact's root, with the cube of the original build
-  uint64_t dag_nodes = 0;  // total of all levels
+  uint64_t dag_nodes = 0;  // nodes of all levels
   SolidCounts solid;       // 0 if the subvolume is not of a solid
 };
 

@@ -22,7 +22,7 @@ inline constexpr size_t kSegmentHeaderBytes = 32;
 struct ArtifactIndex {
   DagShape shape;
   std::vector<ArtifactRoot> roots;
-  std::vector<ArtifactLevel> levels;  // from L-2 upwards
+  std::vector<ArtifactLevel> levels;  // first the bricks (level L-2), then the coarser levels
 };
 
 // Maximum size of the index of an artifact: enough for 3 * 10^10 rows.

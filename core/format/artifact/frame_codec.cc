@@ -15,8 +15,8 @@ namespace {
 // Compression level. With level 1, artifacts would be an eighth smaller, but builds 5 % slower.
 constexpr int kZstdLevel = -1;
 constexpr uint32_t kCompressedFlag = 0x80000000u;
-// After compression has reduced a column of a frame by less than a quarter, the same column of this
-// many following frames is stored uncompressed, to save time.
+// If compression reduces a column of a frame by less than a quarter, the same column is stored
+// uncompressed in this many following frames, to save time.
 constexpr uint32_t kFramesToSkip = 15;
 constexpr size_t kBrickColumn = 0, kMaskColumn = 1;
 

@@ -13,7 +13,7 @@ namespace voxdag {
 namespace {
 
 // A region of a coarser tier (attribute_section_writer.h), and its contribution to the value of its
-// parent: the cell of the next coarser tier that contains the region.
+// parent. The parent is the cell of the next coarser tier that contains the region.
 template <class Total>
 struct CoarseRegion {
   EncodedRegion region;

@@ -64,8 +64,8 @@ struct GlobalFileProgress {
 
 // True if the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
-// True if `file` may be a complete or incomplete global file: it begins with the magic of a global
-// file, or its first page, which is written last, still has only zeros.
+// True if it is possible that `file` is a complete or incomplete global file: it begins with the
+// magic of a global file, or its first page, which is written last, still has only zeros.
 bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {

@@ -25,7 +25,7 @@ class WatchedFile {
                       "that does not change");
   }
 
-  // Returns the result of work(). If work() throws an Error, pages of zeros may be the cause. So
+  // Returns the result of work(). If work() throws an Error, pages of zeros can be the cause. So
   // run() then calls check_readable(), whose error replaces the error of work(). If work() returns,
   // run() does not call check_readable(). So work() itself must call it before it publishes a
   // result.

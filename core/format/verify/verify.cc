@@ -26,7 +26,7 @@ using namespace global_layout;
 
 namespace {
 
-constexpr uint64_t kBlocksPerItem = 64;  // 4 MiB
+constexpr uint64_t kBlocksPerItem = 64;  // checksum blocks, 4 MiB together
 
 class Verifier {
  public:

@@ -16,7 +16,7 @@ constexpr uint64_t kNodesPerRange = uint64_t{1} << 22;  // their HashedNodes tak
 
 struct HashedNode {
   uint64_t hash = 0;
-  uint64_t at = 0;  // its first word
+  uint64_t at = 0;  // word offset at which it begins
 };
 
 std::string place_in(const voxdag_reader::File& file, uint32_t level, uint64_t word) {

@@ -24,9 +24,9 @@ inline voxdag_reader::Node verified_node(const voxdag_reader::File& file, uint32
 // the node at word `b` in the total order.
 bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, uint64_t b);
 
-// Checks that the nodes of level `level` + 1 are in the order by first parent: each pointer in
-// `level`, in order, refers to a node to which an earlier pointer refers, or to the node directly
-// after all those nodes. `index` is the index of `level`. Throws Error{kCorrupt}.
+// Checks that the nodes of level `level` + 1 are in the order by first parent. In this order, each
+// pointer in `level` refers to a node to which an earlier pointer refers, or to the node that
+// follows the last of these nodes. `index` is the index of `level`. Throws Error{kCorrupt}.
 void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
                           const CancelToken& cancel);
 

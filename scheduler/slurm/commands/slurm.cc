@@ -229,9 +229,9 @@ void Slurm::submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTas
                     "--comment=" + std::to_string(first), "--array=" + ranges(indexes) + limit});
     const CommandResult submitted =
         run(command, line + " $((" + std::to_string(first) + " + SLURM_ARRAY_TASK_ID))\n");
-    // The array exceeds a limit of Slurm, but half of it may not. If Slurm has already accepted
-    // some tasks of this request, accepted_job() throws Error{kIo} instead, and the caller submits
-    // the remaining batches later.
+    // The array exceeds a limit of Slurm, but it is possible that half of it does not. If Slurm has
+    // already accepted some tasks of this request, accepted_job() throws Error{kIo} instead, and
+    // the caller submits the remaining batches later.
     if (submitted.exit_status != 0 && is_too_much(submitted) && indexes.size() > 1 &&
         tasks.empty()) {
       const auto middle = indexes.begin() + static_cast<ptrdiff_t>(indexes.size() / 2);

@@ -45,7 +45,7 @@ struct SlurmEnd {
 };
 
 struct SlurmArrayRequest {
-  std::string name;  // for finding the tasks later
+  std::string name;  // name by which active() finds the tasks
   // Each task runs `command` followed by the number of its batch.
   std::vector<std::string> command;
   std::vector<uint32_t> batches;
@@ -81,14 +81,14 @@ class Slurm {
       : commands_(commands), cancel_(cancel), start_s_(start_s) {}
 
   // Throws Error{kInvalidInput} if Slurm is not installed, or if sbatch would refuse these options.
-  // Repeats the request every `pause_s` seconds, after one warning, while Slurm may not know its
-  // nodes yet.
+  // Repeats the request every `pause_s` seconds, after one warning, while it is possible that Slurm
+  // does not know its nodes yet.
   void check(const std::vector<std::string>& options, double pause_s, Progress& progress);
   // Submits the batches as one array, or as several if Slurm's limits require this (such as
   // MaxArraySize, the limit of an index). Adds each batch's task to `tasks` as soon as its array is
   // accepted. Throws Error{kInvalidInput} with sbatch's message if sbatch refuses the array. Throws
-  // Error{kIo} if Slurm does not answer or cannot accept the array now; the array may exist
-  // nevertheless.
+  // Error{kIo} if Slurm does not answer or cannot accept the array now. In this case, it is
+  // possible that the array exists nevertheless.
   void submit(const SlurmArrayRequest& request, std::map<uint32_t, SlurmTask>& tasks);
   // Returns the waiting and running tasks with this name; nullopt if Slurm does not answer.
   std::optional<std::vector<SlurmTask>> active(const std::string& name);

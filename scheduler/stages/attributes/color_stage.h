@@ -6,7 +6,7 @@
 // Resume rule: a baked cube is stored in the work folder (color_store.h) under a key of all its
 // inputs (color_keys.h), and a later run with an equal key reuses it. A stopped run loses only
 // unfinished cubes; a changed texture affects only the cubes that show it. An image is decoded only
-// if a cube that must be baked may show it.
+// if it is possible that a cube that must be baked shows it.
 #pragma once
 
 #include <cstdint>

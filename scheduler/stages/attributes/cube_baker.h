@@ -24,8 +24,8 @@ class CubeBaker {
   using Records = std::vector<std::vector<std::byte>>;
 
   // Charges `region_bytes` (at least ColorMemory::kRegionBytes) and ColorMemory::value_bytes() to
-  // `budget`. With more memory, regions are baked in fewer pieces. In addition, surfaces in memory
-  // take up to `surface_bytes`. `cutouts` may be null. The references must outlive the baker.
+  // `budget`. With more memory, regions are baked in fewer pieces. Surfaces in memory take another
+  // `surface_bytes` at most. `cutouts` may be null. The references must outlive the baker.
   CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> attributes,
             std::span<const Material> materials, TextureReader& textures, RecordStore& store,
             uint64_t region_bytes, uint64_t surface_bytes, MemoryBudget& budget,

@@ -119,7 +119,7 @@ class Worker {
   ExecutorCounts counts;
 
  private:
-  // Builds a subvolume of a solid that has no voxel of the shell. It needs no triangles.
+  // Builds a subvolume of a solid if no triangle touches the subvolume.
   std::vector<QueuedSubvolume> build_without_shell(const QueuedSubvolume& queued) {
     const Cube& cube = queued.subvolume.cube;
     progress_.subvolume_begun(queued.subvolume.id);

@@ -73,9 +73,9 @@ class WalkPass {
  private:
   using Places = std::array<ArtifactTree::Place, kCubes>;
 
-  // Returns a neighbor of the cube, or the cube itself if `neighbor` is 0, as a cube of the grid
-  // in which the artifacts in tree_ are: the voxels' grid for kBlocked, the positions' grid for
-  // kEnclosed. Returns nullopt if the neighbor is outside this grid.
+  // Returns a neighbor of the cube, or the cube itself if `neighbor` is 0. The result is a cube of
+  // the grid to which the artifacts in tree_ belong. This is the voxels' grid for kBlocked, and the
+  // positions' grid for kEnclosed. Returns nullopt if the neighbor is outside this grid.
   std::optional<Cube> source_cube(const Cube& cube, int neighbor) const {
     Cube out = cube;
     for (int a = 0; a < 3; ++a) {

@@ -26,8 +26,8 @@ DagShape position_shape(const DagShape& shape);
 void find_blocked(BuildJob& job, const std::vector<FilledPart>& shell, FilledParts& blocked);
 
 // Computes the enclosed voxels, which include the shell, from the closed positions in `closed`.
-// Passes them to solid.complete(). Warns if the solid has no voxels but the shell's. Throws as
-// find_blocked() does.
+// Passes them to solid.complete(). Warns if all voxels of the solid are voxels of the shell. Throws
+// as find_blocked() does.
 void find_enclosed(BuildJob& job, const std::vector<FilledPart>& closed, FilledParts& solid);
 
 }  // namespace voxdag

@@ -1,5 +1,5 @@
-// The parts of the grid that have voxels of the shell, and the components of the empty space at
-// their faces (core/dag/space).
+// The parts of the grid that have voxels of the shell (voxels that triangles touch), and the
+// components of the empty space at their faces (core/dag/space).
 #pragma once
 
 #include <cstdint>

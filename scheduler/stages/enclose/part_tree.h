@@ -17,7 +17,7 @@ class PartTree {
   // A given cube, or a maximal empty cube.
   struct Leaf {
     Cube cube;
-    uint32_t part = kEmpty;  // index of the given cube
+    uint32_t part = kEmpty;  // index of the given cube; kEmpty for an empty cube
   };
   // A node or a leaf.
   struct Ref {

@@ -55,7 +55,7 @@ int64_t longest_edge(const BuildSpec& spec) {
 }
 
 // True if the CPU backend in this process certainly builds the subvolumes, with the memory in
-// `run`. A GPU and the tasks of a cluster may have less memory.
+// `run`. A GPU and the tasks of a cluster can have less memory.
 bool builds_on_this_cpu(const BuildSpec& spec) {
   const RunOptions& run = spec.run;
   if (run.cluster) return false;

@@ -19,7 +19,7 @@ constexpr int64_t kMinCellEdge = 2 * kSmallestEdge;
 
 ExpectedWork expected_work(const SnappedTriangle& t) {
   constexpr double kVoxel = 1.0 / kUnitsPerVoxel, kBrick = 1.0 / kBrickEdge;
-  double e[2][3], extents = 0;  // in voxels
+  double e[2][3], extents = 0;  // two edges, and the sum of the extents, in voxels
   for (int a = 0; a < 3; ++a) {
     e[0][a] = (t.v[1][a] - t.v[0][a]) * kVoxel;
     e[1][a] = (t.v[2][a] - t.v[0][a]) * kVoxel;

@@ -43,13 +43,13 @@ void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
 }
 
 // Reads the artifacts of all built subvolumes and returns the damaged ones. Reads only levels above
-// `level` (with smaller numbers), because deeper levels may already be released.
+// `level` (with smaller numbers), because the merge releases deeper levels while it runs.
 std::vector<DamagedSubvolume> find_damaged(std::span<const StoredSubvolume> subvolumes,
                                            uint32_t level, const WorkFolder& work,
                                            const CancelToken& cancel) {
   std::vector<DamagedSubvolume> damaged;
   std::map<uint32_t, std::shared_ptr<ReadableFile>> segments;
-  std::set<std::pair<uint32_t, uint64_t>> sound;  // artifacts, by segment and offset
+  std::set<std::pair<uint32_t, uint64_t>> sound;  // intact artifacts, by segment and offset
   for (const StoredSubvolume& subvolume : subvolumes) {
     if (subvolume.state != SubvolumeState::kBuilt || subvolume.summary.empty()) continue;
     cancel.check();

@@ -93,7 +93,7 @@ class TouchedPiece {
   CubeTree::Hint hint_;
   const size_t leaves_;
   const size_t record_bytes_;
-  const size_t capacity_;  // in records
+  const size_t capacity_;  // capacity of records_, in records
   PageBuffer<std::byte> records_;
   size_t used_ = 0;
   std::vector<Run> runs_;

@@ -68,7 +68,8 @@ double grow_as_surface(double coarse, double fine, int doublings) {
 // interior, b R^2 for the area of surfaces.
 double grow_as_volume(double coarse, double fine, int doublings) {
   const double ratio = std::exp2(doublings);
-  const double cube = 2 * (fine - 4 * coarse), square = fine - cube;  // both at the fine pilot
+  // a R^3 and b R^2 at the fine pilot.
+  const double cube = 2 * (fine - 4 * coarse), square = fine - cube;
   if (cube <= 0) return grow_as_surface(coarse, fine, doublings);
   return std::max((cube * ratio + square) * ratio * ratio, fine);
 }
@@ -131,9 +132,9 @@ PlannedRows planned_rows(const PreparedScene& scene) {
   return rows;
 }
 
-// Returns the number of sets of artifacts that the work folder stores for an enclosed solid, in
-// addition to its shell: the filled solid, and with a radius also the blocked and the closed
-// positions, which take about the same space.
+// Returns the number of sets of artifacts that the work folder stores for an enclosed solid in
+// addition to the artifacts of its shell. One set is the filled solid. With a radius, the blocked
+// and the closed positions are two more sets. All sets take about the same space.
 double artifact_copies(const GeometryOptions& options) { return options.radius > 0 ? 3 : 1; }
 
 // The disk space and the memory that only a solid needs.

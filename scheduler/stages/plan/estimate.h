@@ -28,7 +28,7 @@ namespace voxdag {
 // The interior of a solid, and the counts of the finer pilot's sample rows.
 struct SolidEstimate {
   std::string rule;
-  EstimateRange interior;  // voxels of the solid that are not in its shell
+  EstimateRange interior;  // voxels of the solid that no triangle touches
   EstimateRange disputed;  // interior voxels whose views disagree (core/geometry/solid_rule.h)
   RowCounts rows;
   std::optional<Warning> warning;  // the warning that the build is expected to give

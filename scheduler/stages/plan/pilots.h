@@ -19,8 +19,8 @@ struct PilotCounts {
   double dag_nodes = 0;
   double file_bytes = 0;  // size of the pilot's global file, which is not written
   double cpu_s = 0;
-  // Only for solids: interior voxels (set voxels that are not in the shell), disputed voxels among
-  // them, and the counts of sample rows.
+  // Only for solids: interior voxels (set voxels that no triangle touches), disputed voxels among
+  // them (SubDagSummary in core/dag/sub_dag.h), and the counts of sample rows.
   double interior = 0;
   double disputed = 0;
   RowCounts rows;

@@ -16,7 +16,8 @@ namespace voxdag {
 // Levels of the finest pilot of an enclosed solid.
 inline constexpr uint32_t kEnclosedPilotLevels = 11;
 
-// The views from the low faces of a pilot's grid, and the counts of its sample rows.
+// The views (core/geometry/solid_rule.h) from the low faces of a pilot's grid, and the counts of
+// its sample rows.
 class PilotRows {
  public:
   // Charges the views to the budget. Throws OutOfBudget.
@@ -38,7 +39,7 @@ class PilotRows {
   RowCounts counts_;
 };
 
-// Receives the shell of a pilot.
+// Receives the shell of a pilot: the voxels that triangles touch.
 class ShellLevels : public SubDagSink {
  public:
   explicit ShellLevels(PooledMemory& memory) : memory_(memory) {}

@@ -12,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kBytesOfTile = sizeof(OutsideTile) + 96;  // with the map's node
+constexpr uint64_t kBytesOfTile = sizeof(OutsideTile) + 96;  // a tile and its node in the map
 
 // The triangles of a piece of the scene that extend beyond the grid and that the grid's sample rows
 // can cross.

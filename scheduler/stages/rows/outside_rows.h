@@ -1,6 +1,6 @@
-// The crossings of sample rows with triangles outside the grid. A sample row is a line that
-// continues beyond the grid. Only a grid that is given by --bounds can have triangles outside. No
-// subvolume has these crossings. Not thread-safe.
+// The crossings of sample rows with triangles outside the grid. A sample row
+// (core/geometry/solid_rule.h) is a line that continues beyond the grid. Only a grid that is given
+// by --bounds can have triangles outside. No subvolume has these crossings. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ class OutsideRows {
   // axes.
   const OutsideTile* find(int axis, int first, int second) const;
   // Calls visit(axis, first, second, tile) for each tile with a sample row that a triangle crosses
-  // outside the grid. The arguments are as for find().
+  // outside the grid. The arguments have the same meaning as in find().
   template <class Visit>
   void for_each(Visit visit) const {
     for (const auto& [key, tile] : tiles_) visit(key[0], key[1], key[2], tile);

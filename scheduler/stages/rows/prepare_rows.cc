@@ -10,7 +10,7 @@ namespace voxdag {
 void prepare_rows(BuildJob& job, std::span<const StoredSubvolume> planned,
                   std::span<const BinId> bins, const TriangleStore& triangles) {
   if (!job.rows || job.rows->is_ready()) return;
-  if (planned.size() != job.store->leaves().size()) job.has_rows();  // throws
+  if (planned.size() != job.store->leaves().size()) job.has_rows();  // throws Error{kCorrupt}
   std::vector<PlannedCube> cubes;
   for (size_t i = 0; i < planned.size(); ++i) cubes.push_back({planned[i].cube, bins[i]});
   std::optional<OutsideRows> outside;

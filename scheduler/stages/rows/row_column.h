@@ -1,4 +1,5 @@
-// The sample rows of a column of subvolumes along an axis.
+// The sample rows of a column of subvolumes along an axis. core/geometry/solid_rule.h defines
+// sample rows, blocks and views.
 //
 // The square of a cube is its projection along the axis. The column's square is the square of its
 // largest subvolume and contains the squares of the others. The rows are stored by tiles of the

@@ -24,7 +24,7 @@ struct SumsOfCube {
 
 // A corner of an empty cube. A column computes the view from this corner.
 struct EmptyCorner {
-  size_t empty;  // index of the cube
+  size_t empty;  // index of the cube in empty_
   int corner;
 };
 
@@ -273,7 +273,7 @@ class RowsStage {
   std::vector<Cube> empty_;
   std::vector<int64_t> empty_views_;
   std::vector<Column> columns_;
-  std::map<Square, size_t> known_[3];  // columns, by axis
+  std::map<Square, size_t> known_[3];  // for each axis, the columns by their squares
   std::mutex mutex_;
 };
 

@@ -1,5 +1,6 @@
-// The rows stage of a solid: from the bins of all subvolumes to the views from their low faces, and
-// to the full cubes (SolidRows::full_cubes).
+// The rows stage of a solid. From the bins of all subvolumes, it computes the views
+// (core/geometry/solid_rule.h) from the low faces of the subvolumes, and the full cubes
+// (SolidRows::full_cubes).
 //
 //   1. Each subvolume: the crossings of its triangles with its own sample rows (RowSums).
 //   2. Each column of subvolumes along each axis (row_column.h): the totals of its rows, then the

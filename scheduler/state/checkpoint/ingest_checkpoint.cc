@@ -14,8 +14,8 @@ namespace voxdag {
 namespace {
 
 // Upper bounds, in ns, of the steps in which the clock for file times advances. A step is usually
-// at most ten milliseconds. If no time of a file has a fraction of a second, its file system may
-// store times with steps of up to two seconds.
+// at most ten milliseconds. If no time of a file has a fraction of a second, it is possible that
+// its file system stores times with steps of up to two seconds.
 constexpr int64_t kSecondNs = 1'000'000'000;
 constexpr int64_t kTickNs = kSecondNs / 10;
 constexpr int64_t kCoarseTickNs = 2 * kSecondNs;

@@ -42,8 +42,8 @@ class IngestCheckpoint {
   // Returns the state of an earlier run with this scene and enables checkpoints; nullopt if there
   // is no such state.
   std::optional<IngestState> resume();
-  // True if the scene is large enough for checkpoints and one of two conditions holds: the
-  // triangles do not fit in memory, so that the disk must hold them anyway, or the disk has ample
+  // True if the scene is large enough for checkpoints, and one of two conditions holds. Either the
+  // triangles do not fit in memory, so that the disk must hold them anyway. Or the disk has ample
   // space.
   bool is_worthwhile(const TriangleSource& scene) const;
   // Throws Error{kNoSpace} if memory and disk together have no space for the scene's triangles.

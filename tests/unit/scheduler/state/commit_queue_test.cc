@@ -33,7 +33,7 @@ class SlowDisk : public ForwardingFiles {
   void unblock_syncs() {
     set([&] { blocked_ = false; });
   }
-  void fail_writes_from(int number) { failing_write_ = number; }  // from 1
+  void fail_writes_from(int number) { failing_write_ = number; }  // the first write has number 1
   void fail_next_sync() { failing_sync_ = true; }
   int begun_syncs() {
     std::lock_guard lock(mutex_);
@@ -92,7 +92,7 @@ class CommitQueueTest : public testing::Test {
  protected:
   static constexpr uint32_t kLevels = 10, kBits = 64;
   static constexpr size_t kSubvolumes = 200;
-  static constexpr uint64_t kGroup = 60000;  // bytes: a few artifacts
+  static constexpr uint64_t kGroup = 60000;  // size in bytes: a few artifacts
   static constexpr double kNeverS = 1e9;
 
   CommitQueueTest() {

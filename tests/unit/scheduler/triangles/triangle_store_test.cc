@@ -76,7 +76,7 @@ TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
       BinWriter writer(*store, ids, 1 << 16);
       std::mt19937_64 random(7);
       for (int i = 0; i < 5000; ++i) {
-        const size_t target = random() % 3;  // the last one is empty
+        const size_t target = random() % 3;  // the last bin remains empty
         expected[target].push_back(random_triangle(random, wide ? kCoordinateLimit : 1ll << 31));
         writer.append(target, expected[target].back());
       }
