@@ -30,8 +30,8 @@ class NewJob {
     });
     this.labels = h("input", {autocomplete: "off", on: {change: () => this.changed()}});
     this.error = h("div", {role: "alert"});
-    // A double click sends two requests with the same idempotency key, so only one job is created.
-    // The key changes when the user changes the form.
+    // The idempotency key changes only when the user changes the form. So two requests for the same
+    // form, for example after a double click, create only one job.
     this.key = randomKey();
     this.submit = h("button", {class: "primary"}, "Submit");
     this.element =
