@@ -54,7 +54,7 @@ def in_chromium(name, screenshots, check, options=()):
 class Window:
     """A page that records every error the browser reports. leave() fails if there were any."""
 
-    timeout_ms = 120_000  # for each step, on a slow machine
+    timeout_ms = 120_000  # limit of each step; long enough for a slow machine
 
     def __init__(self, browser, pictures, name, **options):
         self.context = browser.new_context(accept_downloads=True, **options)

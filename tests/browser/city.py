@@ -7,7 +7,7 @@ from programs import DagFile, read_npy
 
 
 class City:
-    """Built once, in a folder that several processes read."""
+    """The city. One process builds it in a folder, and several processes read it there."""
 
     def __init__(self, folder):
         self.folder, self.built = folder, folder / "city_8192.vdag"
@@ -33,7 +33,8 @@ class City:
         return self.folder / f"depth-{name}.npy"
 
     def make_cameras(self, voxdag):
-        """Cameras from far to near: two with much sky, one straight down, one with large voxels."""
+        """Returns cameras from far to near: two see much sky, one looks straight down, and one sees
+        large voxels."""
         views = {name: voxdag.named_view(self.built, name) for name in ("iso", "top", "inside")}
         dag = DagFile(self.built)
         inside = numbers(views["inside"])

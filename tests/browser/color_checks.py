@@ -9,7 +9,7 @@ from picture_checks import HEIGHT, WIDTH, assert_light
 MIN_SHARE = 0.03  # minimum share of the picture for each box
 MAX_MEAN = 3  # maximum difference of a channel's mean, of 255
 
-# The canvas's pixels, rows from the top.
+# Decodes a PNG picture of the canvas. Returns its pixels, the top row first.
 DECODE = """async (png) => {
   const image = new Image();
   image.src = `data:image/png;base64,${png}`;
@@ -194,7 +194,7 @@ def check_small_pool(visitor, url, camera, reference):
     seen = visitor.statistics()
     assert 0 < seen["colorBytes"] <= seen["colorPoolBytes"] <= 1 << 18, seen
     assert seen["poolBytes"] + seen["colorPoolBytes"] <= seen["budgetBytes"], seen
-    # The shaders' probing finds every loaded page, and no other entry is in use.
+    # Searches the hash table for every loaded page as the shaders do. No other entry may be in use.
     wrong = visitor.page.evaluate("""() => {
   const {store} = voxdagViewer.renderer.stream.colors;
   let wrong = 0, used = 0;

@@ -73,7 +73,7 @@ def check_measure(visitor):
     assert all(a < b for a, b in zip(low, high))
     page.get_by_label("Show only the inside of a box").uncheck()
     assert page.evaluate("voxdagViewer.viewer.options.clip") is None
-    # A click into the sky keeps the start of the measurement and its buttons.
+    # After a click into the sky, the start of the measurement and the buttons for it remain.
     page.evaluate("voxdagViewer.viewer.panel.pick.set(null)")
     page.get_by_role("button", name="Measure from here", pressed=True).wait_for()
     page.get_by_role("button", name="Clear").click()
@@ -191,7 +191,8 @@ def check_camera_text(visitor, voxdag, built, camera):
     page.get_by_text("Expected --camera X,Y,Z.").wait_for()
 
 
-# Follows an address while the camera glides elsewhere. Resolves when nothing moves.
+# Sets the fragment of the address while the camera glides to another place. Waits until the camera
+# stops, and returns whether it was gliding.
 FOLLOW = """async ([elsewhere, hash]) => {
   const {viewer} = voxdagViewer;
   if (elsewhere) viewer.flyToText(elsewhere);
@@ -203,7 +204,8 @@ FOLLOW = """async ([elsewhere, hash]) => {
   while (viewer.motion.flight) await new Promise((resolve) => requestAnimationFrame(resolve));
   return glides;
 }"""
-# Members of addresses, and the values that the viewer uses for them in a grid of `resolution`.
+# Clipping boxes in addresses, and the boxes that the viewer uses for them in a grid of `edge`
+# voxels per edge.
 BOXES = [
     ("-5,1.6,0,9e99,10.2,1e300", lambda edge: {"low": [0, 2, 0], "high": [edge, 10, edge]}),
     ("1e9,0,0,2e9,9,9", lambda edge: None),

@@ -16,9 +16,8 @@ class Faults:
     def __init__(self, page):
         self.page, self.asked = page, []
         self.way = "none"
-        self.tile = self.page_of_colors = self.malformed = (
-            None  # damaged ones, among those requested first
-        )
+        # The names of the damaged tile, the damaged color page and the malformed tile, once chosen.
+        self.tile = self.page_of_colors = self.malformed = None
         page.route(re.compile(r"/api/.*/tiles(/|$)"), self.answer)
 
     def answer(self, route):
@@ -37,7 +36,8 @@ class Faults:
 
     @staticmethod
     def names_of(url):
-        """Names in a request: LEVEL.OFFSET of tiles, LEVEL.X.Y.Z of pages, none of the manifest."""
+        """Returns the names in a request: LEVEL.OFFSET of tiles, LEVEL.X.Y.Z of color pages. A
+        request for the manifest has no names."""
         parts = urlsplit(url)
         query = parse_qs(parts.query)
         if "nodes" in query or "pages" in query:
@@ -104,7 +104,7 @@ def check_damaged_parts(visitor, faults, url, wide, reference):
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert holes(reference, depths) < 0.005, "damaged tiles leave holes"
     status_says(visitor, "damaged and drawn coarse: run voxdag verify")
-    # The remaining samples of the picture may request a few more.
+    # The remaining samples of the picture can request a few more tiles.
     visitor.wait_until("voxdagViewer.renderer.statistics().loading === 0")
     seen = visitor.statistics()
     assert seen["tiles"] > 10 and seen["colorPages"] > 10, seen
@@ -141,7 +141,7 @@ def check_file_that_goes(visitor, faults, url, near, wide):
             visitor.show(wide)
             status_says(visitor, text)
         before = len(faults.asked)
-        assert 0 < before <= 7, f"{way}: {faults.asked}"  # all requests in flight, and the manifest
+        assert 0 < before <= 7, f"{way}: {faults.asked}"  # requests in flight, manifest
         visitor.show(near)
         visitor.show(wide)
         assert len(faults.asked) == before, f"{way}: asks for {faults.asked[before:]}"
@@ -170,7 +170,7 @@ def check_root_that_fails(visitor, faults):
 
 
 def check_all(walk, server, built):
-    """All loader checks, with a small file that has colors."""
+    """Runs all checks of this module, with a small file that has colors."""
     wide = walk.voxdag.named_view(built, "iso")
     eye, target = (
         list(map(float, re.search(rf"--{name} (\S+)", wide)[1].split(",")))

@@ -7,7 +7,8 @@ from running_checks import RESOLUTION, SCENE, SUBVOLUME, Job
 
 IS_RESULT = "Boolean(window.voxdagViewer) && !voxdagViewer.running"
 
-# Times at which the page requested its job, and whether to "answer" or "lose" a request.
+# Records the times at which the page requests its job. `asked.way` decides whether such a request
+# gets an answer ("answer") or fails ("lose").
 ASKED = """
 window.asked = {times: [], way: "answer"};
 const plainFetch = window.fetch;
@@ -21,7 +22,7 @@ window.fetch = (url, options) => {
 """
 
 
-# As if the user returned to the tab, which ends a pause.
+# Simulates that the user returns to the tab. This ends a pause between two requests.
 WAKE = "document.dispatchEvent(new Event('visibilitychange'))"
 
 

@@ -10,7 +10,8 @@ CONNECTION_LOST = (
 )
 
 
-# Requests for all tiles but the root "arrive", "fail", or are "late" until released.
+# Changes the requests for all tiles except the root. `tiles.way` decides: they "arrive", they
+# "fail", or they are "late", which means that they wait until the test releases them.
 TILES = """
 window.tiles = {way: "%s", pauseMs: 0, asked: 0, held: []};
 const plainFetch = window.fetch;
@@ -33,7 +34,7 @@ def check_missing_tiles(visitor, url, way, cameras, references):
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera, complete=False)
     visitor.wait_until("tiles.asked > 0")
-    visitor.page.wait_for_timeout(200)  # and ignores the result
+    visitor.page.wait_for_timeout(200)  # so that failed requests have an effect
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert holes(references[name], depths) < 0.005, f"tiles that are {way} leave holes"
     _, near, _ = compare(references[name], depths, camera)
@@ -62,7 +63,8 @@ def check_hanging_request(visitor, url):
     visitor.wait_until("performance.getEntriesByName('voxdag: tiles of the first view').length > 0")
 
 
-# A browser that compiles when a program's result is queried. Counts the programs linked before.
+# Simulates a browser that compiles a program only when its result is queried. Counts the programs
+# that were linked before the first query.
 SERIAL_COMPILER = """
 const {getExtension, linkProgram, getProgramParameter} = WebGL2RenderingContext.prototype;
 const serial = window.serial = {linked: 0, beforeResult: 0};
@@ -106,8 +108,8 @@ def check_restart(visitor, server, cameras, references):
     visitor.page.locator("#status:not(.bad)").wait_for(state="attached")
 
 
-# Places the first camera, which determines the sun, inside the scene. Resolves to whether the view
-# is complete within two minutes: a busy machine draws slowly.
+# Treats the first camera, which determines the sun, as inside the scene. Returns whether the view
+# becomes complete within two minutes. This is long, because a busy machine draws slowly.
 COMPLETE_WITH_SUN = """async (pauseMs) => {
   const {viewer, renderer, camera, manifest} = voxdagViewer, {eye, target} = camera.get();
   renderer.light.placeSun(eye, target.map((c, axis) => c - eye[axis]));

@@ -1,8 +1,9 @@
 """Answers that are damaged, refused, late or missing."""
 
-BAD_PAGE = 77  # of the trials
+BAD_PAGE = 77  # the number of the page that the services of TRIALS report as damaged
 
-# Every edit of a valid tile, page, batch or manifest must be refused. Returns the accepted ones.
+# Makes invalid input by changes to a valid tile, page, batch and manifest. All must be refused.
+# Returns the changes that were accepted.
 BAD_INPUT = """async () => {
   const {decodeTile, tileShape} = await import("/viewer/tiles/tile_format.js");
   const {decodePage} = await import("/viewer/colors/page_format.js");
@@ -163,8 +164,8 @@ def check_bad_input(visitor):
     assert not wrong, wrong
 
 
-# Loaders of color pages without a picture, each with its own service, all running concurrently. A
-# page's only word is its number.
+# Runs several loaders of color pages concurrently, each with a separate simulated service and
+# without a picture. Each page consists of one word, its number.
 TRIALS = """async (bad) => {
   const {TileSource} = await import("/viewer/tile_source.js");
   const {ColorLoader} = await import("/viewer/colors/color_loader.js");
@@ -281,7 +282,8 @@ TRIALS = """async (bad) => {
   return Object.fromEntries(results);
 }"""
 
-# A loader wakes the renderer at the earlier and at the later of two times.
+# Requests three wake-ups from a loader, after 50, 400 and 200 ms. Returns the times at which the
+# loader wakes the renderer: at the earliest and at the latest of the three.
 WAKES = """async () => {
   const {ColorLoader} = await import("/viewer/colors/color_loader.js");
   const beginMs = performance.now(), wakes = [];

@@ -116,9 +116,9 @@ def check_framing(visitor, url):
 
 
 class ParentPage(BaseHTTPRequestHandler):
-    """The page of another program of this machine, with two frames."""
+    """Serves the page of another program of this machine. It has two frames with the viewer."""
 
-    url = ""  # of the viewer
+    url = ""  # the URL of the viewer
 
     def do_GET(self):
         self.send_response(200)
@@ -133,7 +133,7 @@ class ParentPage(BaseHTTPRequestHandler):
 
 
 def check_embedded(visitor, url):
-    """Pages of this machine may show the picture in a frame with ?embed, and nothing else."""
+    """Pages of this machine can show the viewer in a frame only with ?embed."""
     page = visitor.page
     ParentPage.url = url
     with ThreadingHTTPServer(("127.0.0.1", 0), ParentPage) as server:

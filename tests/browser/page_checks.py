@@ -10,7 +10,7 @@ HTMLCanvasElement.prototype.getContext = function(kind, ...more) {
   return kind === "webgl2" ? null : getContext.call(this, kind, ...more);
 };
 """
-# A driver that offers WebGL2, but cannot compile the shaders.
+# Simulates a driver that offers WebGL2 but cannot compile the shaders.
 NO_PROGRAMS = """
 const parameter = WebGL2RenderingContext.prototype.getProgramParameter;
 WebGL2RenderingContext.prototype.getProgramParameter = function(program, name) {
@@ -77,8 +77,8 @@ def check_job(visitor, server, voxdag, scene, token):
     page = visitor.page
     viewer = f"{server.url}/viewer.html?job={job['id']}"
     if token:
-        # A job that ends right after the viewer saw it running has no partial result, which
-        # Chromium reports as an error.
+        # Waits until the job has succeeded. If it ended right after the viewer saw it running, a
+        # request for its partial result would fail, and Chromium would report this as an error.
         while json.loads(server.get(f"/api/v1/jobs/{job['id']}", headers))["state"] != "succeeded":
             page.wait_for_timeout(100)
         with visitor.expecting("status of 401"):
@@ -112,9 +112,9 @@ def check_job(visitor, server, voxdag, scene, token):
     )
     assert not page.evaluate("embedded.isContextLost()")
     page.evaluate("location.hash = '#/jobs'")
-    visitor.wait_until(
-        "embedded.isContextLost()"
-    )  # the page remains open, and a browser has few contexts
+    # The page releases the graphics context, because it remains open and a browser has few
+    # contexts.
+    visitor.wait_until("embedded.isContextLost()")
     if token:
         check_expired_token(visitor, viewer, token)
     return viewer

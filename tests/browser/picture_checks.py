@@ -6,7 +6,7 @@ import time
 
 from visitor import resident_bytes_of_descendants
 
-WIDTH, HEIGHT = 200, 90  # of the canvas in the visitor's window, in device pixels
+WIDTH, HEIGHT = 200, 90  # size of the canvas in the visitor's window, in device pixels
 MIN_EQUAL_MASK = 0.995
 MIN_EQUAL_DEPTH = 0.99
 MIB = 1 << 20
@@ -48,7 +48,7 @@ def fov_of(camera):
 
 
 def address(url, camera):
-    """Returns the address of a page that starts with this camera and so has the sun of `render`."""
+    """Returns the address of a page that starts with this camera, so its sun is as in `render`."""
     _, eye, target, fov = re.split(r" ?--\w+ ", camera)
     return f"{url}/{PLAIN}&camera={eye}&target={target}&fov={fov}"
 
@@ -138,8 +138,8 @@ def check_first_view(visitor, url, dag, camera, reference):
     assert same < MIN_EQUAL_DEPTH, "all tiles are there: the check sees nothing"
 
 
-MIN_REGION = 100  # pixels
-MIN_SHADOW = 8  # darker than the sky, of 255
+MIN_REGION = 100  # minimum number of pixels of a region
+MIN_SHADOW = 8  # a shadow is at least this much darker than the sky, of 255
 SKY_TOP, SKY_BOTTOM = (0.46, 0.54, 0.65), (0.86, 0.87, 0.88)  # linear light
 
 
@@ -151,7 +151,7 @@ def sky_of_row(row, height):
 
 
 def inner_pixels(reference, width, height):
-    """Yields (index, row, is hit) of pixels whose neighbors are all sky, or all hits, like them."""
+    """Yields (index, row, is hit) of pixels whose eight neighbors are sky, or hits, as they are."""
     for row in range(1, height - 1):
         for column in range(1, width - 1):
             at = row * width + column
@@ -223,7 +223,7 @@ def check_canvas(visitor, camera, reference, rendered):
     visitor.picture("light")
 
 
-MAX_BLACK = 0.02  # of the canvas
+MAX_BLACK = 0.02  # maximum black share of the canvas
 
 
 def check_inside_cell(visitor, camera):
@@ -241,8 +241,8 @@ def check_inside_cell(visitor, camera):
     visitor.picture("within-cell")
 
 
-# The numbers of blocks that tiles own, that two tiles own, and that are in use; and the statistics
-# of the same moment.
+# Returns four values of the same moment: the number of blocks in the lists of all tiles, how many
+# of these entries are repetitions, the number of blocks in use, and the statistics.
 COUNT_BLOCKS = """() => {
   const {renderer} = voxdagViewer, {store} = renderer.stream, seen = new Set();
   let count = 0;
@@ -303,7 +303,7 @@ def check_budget(visitor, url, cameras, references):
 
 # A pool starts with 256 KiB, not 16 MiB, so that a small scene makes it grow.
 FIRST_ROWS, SMALL_ROWS = "const kFirstRows = 256;", 4
-# Larger textures for tiles fail with an out-of-memory error.
+# Makes the allocation of textures for tiles fail if they have more than SMALL_ROWS rows.
 NO_MEMORY = """
 const {texStorage2D, getError} = WebGL2RenderingContext.prototype;
 window.refusals = 0;
@@ -324,7 +324,8 @@ POOL_ROWS = "voxdagViewer.renderer.stream.store.pool.rows"
 
 
 def check_growing_pool(visitor, url, cameras, references, can_grow):
-    """A pool that grows loses no tile. A pool that cannot grow works with its first texture."""
+    """A pool that grows loses no tile. A pool that cannot grow keeps its first texture and
+    works."""
 
     def begin_small(route):
         script = route.fetch().text()

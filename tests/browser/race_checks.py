@@ -7,7 +7,8 @@ from failure_checks import TILES
 from picture_checks import HEIGHT, PLAIN, WIDTH, address, assert_equal
 from visitor import PIXEL_RATIO
 
-# A pick, and the distance at the same pixel of a picture from the same moment.
+# Picks at a pixel and draws a picture at the same moment. Returns the pick, the distance at this
+# pixel of the picture, and the number of tiles that are being loaded.
 PICK_AND_DEPTH = """async ([x, y, width, height, ratio]) => {
   const {renderer} = voxdagViewer, picking = renderer.pick(x, y);
   const {depth} = await renderer.capture({width, height});
@@ -50,7 +51,7 @@ def check_picks_while_loading(visitor, url, dag, camera, reference):
         return found, loading
 
     coarse, _ = pick()
-    # Tiles that arrive one by one, while complete() waits.
+    # Lets the tiles arrive one by one while complete() waits.
     visitor.page.evaluate("""() => {
       window.whole = false;
       voxdagViewer.renderer.complete().then(() => whole = true);
@@ -92,7 +93,8 @@ PICK_WITHOUT_TILES = """async ([x, y]) => {
 }"""
 
 
-# The tiles first loaded for the view, and how many of them the view is known to use.
+# Looks at the 30 tiles that were loaded first. Returns how many of them the current view is known
+# to use, and their number.
 SEEN = """() => {
   const {store} = voxdagViewer.renderer.stream, tiles = [...store.tiles.values()].slice(0, 30);
   return [tiles.filter(({epoch}) => epoch === store.epoch).length, tiles.length];
@@ -148,8 +150,9 @@ def check_tiles_that_left(visitor, url, dag, cameras, references):
 
 MAX_TILES, FEW_TILES = "const kMaxTiles = 1500;", 40
 FIRST_PIXELS, FINE_PIXELS = "const kPixels = 15;", 1
-MOST_UNDER_WAY = 5 * 48  # four requests, and the arriving one
-# Counts the tiles requested until the first view had its tiles.
+MOST_UNDER_WAY = 5 * 48  # tiles of four requests in progress and of one that has just arrived
+# Counts requested tiles. `asked.atMark` is their number at the end of the search for the first
+# view.
 COUNT_TILES = """
 window.asked = {
   tiles: 0,
@@ -195,7 +198,8 @@ def check_end_of_first_view(visitor, url, camera, reference):
     )
 
 
-# The positions of the camera during a flight, and whether a drag has inertia.
+# Moves the camera to another view. Returns the number of different positions on the way, whether a
+# drag has inertia, and the final position.
 GLIDE = """async (camera) => {
   const {viewer} = voxdagViewer, places = new Set(), end = performance.now() + 120000;
   viewer.motion.startCoasting([1, 0], () => {});

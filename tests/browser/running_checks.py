@@ -9,14 +9,15 @@ import urllib.error
 from pathlib import Path
 
 WAIT_S = 60
-MAX_PAUSE_S = 0.5  # a longer one could miss the awaited state, and even the end
+MAX_PAUSE_S = 0.5  # after a longer pause, the job could be past the awaited state or have ended
 SCENE = "running.glb"
 RESOLUTION, SUBVOLUME = 4096, 512
 # The partial result is drawn in cells of this level.
 CELL_LEVEL = int(math.log2(RESOLUTION / (SUBVOLUME // 4)))
 PICTURE = (96, 54)
 
-# Pixels of the wireframe over the picture, by the kinds of lines.
+# Returns numbers of pixels of the wireframe over the picture: all lines, and lines of active
+# subvolumes.
 WIRES = """() => {
   const canvas = document.querySelector("canvas.wires");
   const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -48,7 +49,7 @@ class Job:
         return self.known("subvolumes")
 
     def known(self, what):
-        """Returns {} before the subvolumes are planned."""
+        """Returns the answer to a request for `what`, or {} before the subvolumes are planned."""
         try:
             return json.loads(self.server.get(f"{self.path}/{what}"))
         except urllib.error.HTTPError as error:
@@ -74,7 +75,7 @@ class Job:
         self.until(state, lambda: self.state() == state)
 
     def build_until(self, built):
-        """Builds at least `count` subvolumes, then suspends the job."""
+        """Lets the job build at least `built` subvolumes, then suspends it."""
         pause_s = 0.05
         while True:
             self.until("one is being built", lambda: self.subvolumes().get("working"))
@@ -87,7 +88,7 @@ class Job:
             pause_s = min(1.5 * pause_s, MAX_PAUSE_S)
 
     def processes(self):
-        """Returns the process id of the running job."""
+        """Returns the process ids of the service's child processes: the running job, if any."""
         threads = Path(f"/proc/{self.server.process.pid}/task").glob("*/children")
         return [
             int(child)
@@ -96,7 +97,7 @@ class Job:
         ]
 
     def hold_at_work(self):
-        """Stops the process while the list has a subvolume being built."""
+        """Stops the job's process at a moment when it is building a subvolume."""
         while True:
             self.until("one is being built", lambda: self.subvolumes().get("working"))
             self.signal(signal.SIGSTOP)
@@ -208,7 +209,8 @@ def check_ends(visitor, server):
 
 def check_running_jobs(visitor, server, scene):
     server.send("PUT", f"/api/v1/scenes/{SCENE}", scene.read_bytes())
-    # Elements that are absent before the plan, after the end and after a deletion.
+    # Before the plan, after the end and after a deletion, the service answers requests with 404 or
+    # 409.
     with visitor.expecting("status of 40[49]"):
         check_ends(visitor, server)
         check_growing(visitor, server)

@@ -12,7 +12,7 @@ from chromium import Window
 # Pixels of the canvas per pixel of the page. Low, because a CPU draws here.
 PIXEL_RATIO = 0.5
 
-# After two animation frames the picture has the new camera.
+# Waits for two animation frames. After them, the picture shows the view of the new camera.
 TWO_FRAMES = """async () => {
   for (let i = 0; i < 2; ++i) await new Promise((resolve) => requestAnimationFrame(resolve));
 }"""

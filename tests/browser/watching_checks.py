@@ -86,7 +86,7 @@ def check_many(visitor, server, data):
     try:
         others = [Job(server, 4 * RESOLUTION) for _ in range(MANY)]
         for other in others:
-            # As if it had run: it waits, because only one job runs.
+            # Copies the folder of the first job. So this waiting job looks as if it had run before.
             shutil.copytree(data / "jobs" / job.id, data / "jobs" / other.id)
             assert other.durable()[1] > 0, "a job that waits has no subvolumes"
         visitor.open(job.page, wait=False)
@@ -107,7 +107,8 @@ def check_many(visitor, server, data):
 
 
 def check_watched_jobs(visitor, server, data, scene, other_scene):
-    """`data` is the data folder of the service. It listens on the same port again."""
+    """Runs all checks of this module. `data` is the service's data folder. After a restart, the
+    service listens on the same port."""
     server.send("PUT", f"/api/v1/scenes/{SCENE}", scene.read_bytes())
     job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
     job.build_until(4)

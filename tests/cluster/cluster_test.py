@@ -31,9 +31,9 @@ slow = unittest.skipUnless(os.environ.get("VOXDAG_LONG"), "in tools/test-long cl
 class ClusterTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        # Slurm's paths of sockets are short.
+        # The folder is in /tmp, because the paths of Slurm's sockets must be short.
         cls.folder = Path(tempfile.mkdtemp(prefix="vdslurm-", dir="/tmp"))
-        # A daemon that crashes writes its core dump here.
+        # Sets the working directory, because a daemon that crashes writes its core dump there.
         os.chdir(cls.folder)
         cls.scene = cls.folder / "city.glb"
         subprocess.run([VOXDAG, "generate", "city", cls.scene, "--triangles", "60000"], check=True,
@@ -232,11 +232,12 @@ class ClusterTest(unittest.TestCase):
         time.sleep(8)
         self.cluster.start_controller()
         self.finish(build, 16384)
-        # Nodes keep the ids of tasks that the new controller may not know and may assign again.
+        # The nodes remember ids of tasks that the new controller may not know. Without a restart of
+        # the nodes, the controller could assign these ids again.
         self.cluster.restart_nodes()
 
     def test_a_node_that_cannot_start_tasks(self):
-        # Slurm would hold the tasks of such a node without a limit of time.
+        # Slurm holds the tasks of such a node until somebody releases or cancels them.
         spool = self.folder / "slurm" / "spool-n1"
         away = spool.rename(f"{spool}.away")
         spool.touch()
@@ -288,7 +289,8 @@ class ClusterTest(unittest.TestCase):
         return {state: states.count(state) for state in set(states)}
 
     def wait_for_tasks(self, name, expected):
-        """Waits for these states, because Slurm can notice a task's end after the build does."""
+        """Waits until the tasks have these states: Slurm can notice their end after the build
+        does."""
         self.wait_for(lambda: self.submitted(name) == expected,
                       lambda: f"{expected} of {self.submitted(name)}", 15)
 
@@ -306,7 +308,7 @@ class ClusterTest(unittest.TestCase):
 
     def test_restart_stops_the_tasks(self):
         build = self.start(16384, 8)
-        # This task cannot end by itself.
+        # A stopped task cannot end by itself.
         os.kill(self.a_task(), signal.SIGSTOP)
         name = self.task_name()
         build.kill()
@@ -318,7 +320,7 @@ class ClusterTest(unittest.TestCase):
 
     def test_the_rest_can_be_built_here(self):
         build = self.start(16384, 8)
-        # A task does not end, so this machine builds its batch.
+        # The stopped task does not end, so this machine has to build its batch.
         stopped = self.a_task()
         os.kill(stopped, signal.SIGSTOP)
         self.wait_for(lambda: list(self.work.glob("segment-*.vdseg")), "accepted batch")
@@ -331,7 +333,7 @@ class ClusterTest(unittest.TestCase):
         self.assertGreater(report["subvolumes"]["reused"], 0)
 
     def test_torn_and_foreign_records_do_not_count(self):
-        # The tasks begin only after the records exist.
+        # The option --begin delays the tasks, so that the damaged records exist before they start.
         build = self.start(16384, 4, "--cluster-options", "--begin=now+4")
         folder = self.work / "cluster"
         self.wait_for(lambda: list(folder.glob("batch-3.vdbatch")), "batch")
@@ -444,8 +446,8 @@ class ClusterTest(unittest.TestCase):
 
     @slow
     def test_a_task_that_is_out_of_memory(self):
-        # No task can run with this little memory. Without cgroups Slurm may report FAILED or
-        # CANCELLED.
+        # A task needs more than 8 MB of memory. Without cgroups, Slurm can report FAILED or
+        # CANCELLED instead of OUT_OF_MEMORY.
         build = self.start(32768, 2, "--cluster-options", "--mem=8M", "--cluster-retries", "0")
         _, messages = self.end(build)
         self.assertEqual(build.returncode, 10, messages)
@@ -486,8 +488,8 @@ class ClusterTest(unittest.TestCase):
         report, _ = self.finish(build, 65536)
         print(f"{kills} kills, {report['cluster']['failed_attempts']} failed attempts", flush=True)
         self.assertEqual(kills, 20)
-        # A task was submitted for each batch and for each attempt that failed, and for nothing that
-        # a record names.
+        # Exactly one task was submitted for each batch and for each failed attempt, so no batch
+        # with a completion record was submitted again.
         self.assertEqual(sum(self.submitted(name).values()),
                          report["cluster"]["batches"] + report["cluster"]["failed_attempts"])
 

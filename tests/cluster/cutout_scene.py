@@ -24,7 +24,7 @@ def png(width, height, pixels):
 
 
 def write_cutouts(path):
-    """Writes a scene of 400 quads. Their image, in a separate file, is visible in every third
+    """Writes a scene of 400 quads. Their image, in a separate file, is visible only in every third
     column."""
     corners, texture = [], []
     generator = random.Random(1)

@@ -105,7 +105,7 @@ class SlurmCluster:
             f"SlurmdLogFile={self.folder}/log/slurmd-%n",
             "ProctrackType=proctrack/linuxproc",
             "TaskPlugin=task/none",
-            # A task that takes more memory than it was given is killed, within a second.
+            # Slurm kills a task that exceeds its memory allocation, within a second.
             "JobAcctGatherType=jobacct_gather/linux",
             "JobAcctGatherFrequency=task=1",
             "JobAcctGatherParams=OverMemoryKill",
@@ -159,7 +159,8 @@ class SlurmCluster:
     def restart_nodes(self):
         for node in self.nodes:
             self.kill_machine(node)
-        # Without this setting, a completing job keeps its node for a minute, until Slurm polls it.
+        # Without the state "down", a job that is completing would occupy its node for a minute,
+        # until Slurm polls the node.
         self.command(
             "scontrol", "update", f"nodename={','.join(self.nodes)}", "state=down", "reason=restart"
         )
@@ -185,7 +186,7 @@ class SlurmCluster:
 
     def wait_for_idle_nodes(self):
         def are_idle():
-            # Slurm drains a restarted node if an earlier task returns to it.
+            # Slurm drains a restarted node if a task from before the restart is still on it.
             self.resume_nodes()
             return self.count_idle() == len(self.nodes)
 

@@ -1,6 +1,7 @@
 # Compiles the CUDA backend's sources as C++ with the headers of the simulated device. Every memory
-# access in them calls a function of the simulation. -fsanitize=thread inserts these calls; its own
-# library is not linked. So there is no simulation in builds with a sanitizer.
+# access in these sources calls a function of the simulation. The option -fsanitize=thread inserts the
+# calls. The library of this sanitizer is not linked, because the simulation replaces it. So builds
+# with a sanitizer cannot contain the simulation.
 if(VOXDAG_SANITIZE)
   return()
 endif()
@@ -25,7 +26,7 @@ add_executable(test_cuda_sim ${conformance_sources} ${cuda_sim_tests})
 target_link_libraries(test_cuda_sim PRIVATE voxdag_cuda_sim voxdag_backend_cpu voxdag_oracle
                       GTest::gmock GTest::gtest_main)
 voxdag_compile_quickly(test_cuda_sim)
-# A precompiled header is only used with the same definitions as in other tests.
+# The compiler uses the precompiled header of the other tests only if all definitions are the same.
 target_compile_definitions(test_cuda_sim PRIVATE
   $<TARGET_PROPERTY:test_support,INTERFACE_COMPILE_DEFINITIONS>
   VOXDAG_SHARED_SCENES="${PROJECT_SOURCE_DIR}/../shared/scenes"
@@ -40,14 +41,15 @@ endforeach()
 gtest_discover_tests(test_cuda_sim DISCOVERY_TIMEOUT 60 TEST_FILTER "SimulatedDevice.*"
   PROPERTIES LABELS cuda_sim_fast TIMEOUT 900)
 
-# The resources that each kernel needs, for the oldest and the newest architecture of the toolkit.
+# Compiles the CUDA sources for the oldest and the newest architecture of the toolkit, and compares
+# the resources of each kernel with recorded values.
 if(VOXDAG_HAS_CUDA AND Python3_FOUND)
   add_test(NAME cuda_kernels COMMAND Python3::Interpreter ${PROJECT_SOURCE_DIR}/tools/check-kernels
                                      --nvcc ${CMAKE_CUDA_COMPILER})
   set_tests_properties(cuda_kernels PROPERTIES LABELS conformance TIMEOUT 900)
 endif()
 
-# Whole builds, with the scheduler's workers.
+# Tests of complete builds, in which several workers use the simulated device.
 add_executable(test_cuda_sim_builds cuda_sim/builds/whole_build_test.cc)
 target_link_libraries(test_cuda_sim_builds PRIVATE voxdag_cuda_sim voxdag_scheduler voxdag_generate
                       test_support GTest::gmock GTest::gtest_main)

@@ -28,7 +28,7 @@ def popcount_below(masks, bits):
 
 
 def child_corners(corners, bits, axes=(4, 2, 1)):
-    """Corners of children, in units of the children's edge; `axes` are the bits of x, y and z."""
+    """Returns the corners of children, in units of their edge; `axes`: bits of x, y and z."""
     return 2 * corners + numpy.stack([(bits & axis) // axis for axis in axes], axis=1)
 
 
@@ -252,7 +252,7 @@ def bt(path, grid, reader):
     listed = subprocess.run([reader, path], capture_output=True, check=True)
     leaves = numpy.frombuffer(listed.stdout, "<i4").reshape(-1, 5)
     corners, edges, occupied = leaves[:, :3] - 32768, leaves[:, 3], leaves[:, 4] == 1
-    # OctoMap's origin is the scene's, up to half a voxel.
+    # OctoMap's cells begin at multiples of the voxel size, so the origin of the grid is rounded.
     corners = corners - numpy.floor(grid.origin / grid.voxel + 0.5).astype(numpy.int64)
     assert ((edges[occupied] == 1) | (edges[occupied] >= 8)).all()
     # Known cells are in the region. Cells at its border can be unknown.
@@ -348,8 +348,8 @@ def vox(path, grid):
 
     visit(0, numpy.zeros(3, numpy.int64))
     x, y, z = numpy.concatenate(cells).T
-    # z is up, the middle of the grid's floor is the origin. A voxel has the coordinate of its low
-    # corner, which for -z is the high corner of z.
+    # In .vox files, z is up, and the origin is the middle of the grid's floor. The coordinate of a
+    # voxel is that of its low corner. For the mirrored axis, this is the voxel's high corner in z.
     middle = grid.resolution // 2
     return numpy.stack([x + middle, z, middle - 1 - y], axis=1)
 

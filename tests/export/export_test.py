@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-# The libraries are packages of the system, which another interpreter does not see.
+# The decoders' libraries are packages of the system. Only the system's interpreter finds them.
 SYSTEM_PYTHON = "/usr/bin/python3"
 
 
@@ -37,7 +37,7 @@ except ImportError:
 import decoders  # noqa: E402
 
 SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
-# Resolution, options of the export.
+# Each export: the resolution of the built file, and the options of the export.
 CASES = [
     (64, []),
     (256, []),
@@ -53,7 +53,7 @@ MORE_CASES = {
     "nvdb": [(64, ["--grid", "mask"]), (256, ["--level", "7", "--grid", "mask"])],
     "npz": [(64, ["--compact"])],
 }
-# Exports with another axis up than the format's default.
+# Exports whose upward axis differs from the format's default (--up).
 TURN_CASES = [(64, []), (256, ["--level", "7", "--region", "9,0,30,90,101,83"])]
 
 # Options of exports of the solid, whose resolution is 64.
@@ -194,7 +194,7 @@ class Test:
         return "sheet.vdag", json.loads(self.run("info", "sheet.vdag", "--json"))
 
     def check_colors(self):
-        """Each voxel has the reader's color, or no color if gray is requested."""
+        """Checks that each voxel has the reader's color, or no color if gray is requested."""
         decode = getattr(decoders, self.name + "_colors", None)
         if not decode:
             return
@@ -220,7 +220,9 @@ class Test:
             print(f"colors of level {level}: {len(expected)} voxels, {colored_bytes} bytes")
 
     def check_level_set(self, resolution, options):
-        """Compares the values of `--grid sdf` with distances to all voxels of the other kind."""
+        """Compares the values of `--grid sdf` with exact distances. The distance of a set voxel is
+        measured to the nearest empty voxel, and the distance of an empty voxel to the nearest set
+        voxel."""
         path, info = self.solid()
         given = dict(zip(options[::2], options[1::2]))
         full, band = resolution.bit_length() - 1, int(given.get("--band", 3))

@@ -3,7 +3,7 @@
 
     tests/long/behind_nginx.py [--voxdag build/cpu/voxdag] [--seed 1]
 
-What must hold, over TLS and through the proxy:
+Checks these requirements, over TLS and through the proxy:
 
   - uploads reach the service while they are being sent; parts, checksums and refusals work;
   - events of a job arrive one by one, not at the end of the stream;
@@ -12,7 +12,7 @@ What must hold, over TLS and through the proxy:
   - a slow client is closed, and too many connections of one address are refused with 429;
   - a restarted service is used again.
 
-Prints a line per check; exit status 1 if anything does not hold.
+Prints a line per check. The exit status is 1 if a requirement is violated.
 """
 
 import argparse
@@ -225,7 +225,8 @@ class Checks:
         assert json.loads(data)["sha256"] == hashlib.sha256(self.data).hexdigest()
 
     def check_refusals(self):
-        """Refusals before the body is read reach a client that sends it."""
+        """A client that is still sending a body gets the refusal that the service sends before it
+        reads it."""
         for headers, path, expected in (
             ({"Authorization": "Bearer wrong"}, "/api/v1/scenes/c.glb", 401),
             ({}, "/api/v1/scenes/c.unknown", 400),
@@ -335,7 +336,7 @@ class Checks:
         return self.proxied.context.wrap_socket(plain, server_hostname="localhost")
 
     def check_slow_clients(self):
-        """A header that does not end is given up after client_header_timeout."""
+        """The proxy closes a connection whose header does not end within client_header_timeout."""
         client = self.context_socket()
         client.sendall(b"GET /healthz HTTP/1.1\r\n")
         begin = time.monotonic()

@@ -7,14 +7,18 @@
                                 [--may-refuse bt,glb,...]
                                 [FILE.vdag[:X0,Y0,Z0,X1,Y1,Z1] ...]
 
-Without files a generated city is built at --resolution. Each file, or region of it, is exported to
-each format. The formats of --may-refuse, by default none for the city and all for files, may be
-refused: then the export must name a selection that fits, and leave no file. Files have no colors,
-or the decoders of ply and npz fail. A written file is decoded completely by tests/export/whole,
-which shares nothing with the exporter, and must have the count and the 128 bits of
-order-independent hashes of positions that the reader header finds in the .vdag file; a glb file,
-the faces between voxels and empty cells. Prints a row of a table for each; exit status 1 if
-anything differs. Takes 12 GB of disk for Sponza at 4096^3.
+Without FILE, the script builds a generated city at --resolution. It exports each file, or a region
+of it, to each format. An export to a format of --may-refuse (default: none for the city, all for
+files) may be refused. Then its error must name a selection that fits, and the export must leave no
+file. The files must not have colors, because the decoders of ply and npz do not support them.
+
+tests/export/whole decodes a written file completely, with code that shares nothing with the
+exporter. It returns the number of voxels and a hash of 128 bits of the voxels' positions, which
+does not depend on their order. Both must equal the values that the reader header finds in the .vdag
+file. For glb, the faces between voxels and empty cells are compared instead of voxels.
+
+Prints a row of a table for each export. The exit status is 1 if anything differs. Takes 12 GB of
+disk for Sponza at 4096^3.
 """
 
 import argparse
@@ -60,7 +64,7 @@ def mebibytes(size):
 
 
 class Selection:
-    """A file or a region of it, and the digests that exports of it must have."""
+    """A file, or a region of a file, and the digests that its exports must have."""
 
     def __init__(self, options, text):
         self.path, _, region = text.partition(":")

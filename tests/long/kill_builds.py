@@ -5,14 +5,14 @@
                               [--generate "terrain --triangles 400000"] [-r 2048]
                               [--color] [--build-options "--threads 2"] [--seed 1]
 
-Without --scene a scene is generated. With --color the file has colors. The build is killed
+Without --scene a scene is generated. With --color the file has colors. Each build is killed
 (SIGKILL) one to six times, each time at a random moment of the remaining time, and started again
-without a pause; then it runs to its end. What must hold:
+without a pause. After the last kill it runs to its end. The script checks these requirements:
 
-  - no command is refused or fails, whatever the killed one has left or still holds;
-  - the file has the SHA-256 of a build that nobody disturbed, and nothing else is left.
+  - No command is refused or fails, whatever files and locks the killed command has left.
+  - The file has the SHA-256 of an undisturbed build, and no other file is left.
 
-Prints a line per 25 kills and the totals; exit status 1 if anything does not hold.
+Prints a line per 25 kills, and the totals. The exit status is 1 if a requirement is violated.
 """
 
 import argparse
@@ -95,7 +95,7 @@ class Builds:
                 self.kills += 1
                 left = max(0.1, left - pause / 2)
             if process.returncode is None:
-                # The next command starts while the system still takes this process apart.
+                # The next command starts while the system still removes the killed process.
                 self.dying.append(process)
                 continue
             self.finished_early += 1

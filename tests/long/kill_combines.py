@@ -4,13 +4,13 @@
     tests/long/kill_combines.py [--voxdag build/cpu/voxdag] [--kills 30] [-r 2048] [--seed 1]
 
 Two scenes are generated and built. Each command is killed (SIGKILL) at a random moment of its
-usual time. What must hold:
+usual time. The script checks these requirements:
 
-  - the output does not exist, or it is the complete file;
-  - the next run succeeds, and its file has the SHA-256 of a run that nobody disturbed;
-  - nothing else is left.
+  - The output does not exist, or it is the complete file.
+  - The next run succeeds, and its file has the SHA-256 of an undisturbed run.
+  - No other file is left.
 
-Exit status 1 if anything does not hold.
+The exit status is 1 if a requirement is violated.
 """
 
 import argparse

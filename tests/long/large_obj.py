@@ -5,11 +5,10 @@
                             [--resolution 2048]
 
 Writes a hilly sheet of EDGE x EDGE vertices with texture coordinates: 1 GB of OBJ by default.
-Builds it with --memory 64MiB and with the default. What must hold: the peak of resident memory is
-at most 64 MiB above the limit, by the build's report and by the system's own measurement, and the
-files are equal. Then builds the glTF file, whose voxels must be the same, for comparison of the
-CPU time. Takes some minutes and several GB of disk; scenes that the folder has already are used
-again.
+Builds it with --memory 64MiB and with the default. Checks that the peak of resident memory is at
+most 64 MiB above the limit, by the build's report and by the system's own measurement, and that the
+files are equal. Then builds the glTF file, whose voxels must be the same, for comparison of the CPU
+time. Takes some minutes and several GB of disk; scenes that the folder has already are used again.
 """
 
 import argparse

@@ -5,10 +5,10 @@
                             [--resolution 2048]
 
 Writes a hilly sheet of EDGE x EDGE vertices, whose rows of faces are scattered over the file: 906
-MiB by default. Builds it with --memory 64MiB and with the default. What must hold: the peak of
-resident memory is at most 64 MiB above the limit, by the build's report and by the system's
-own measurement, and the files are equal. Takes some minutes and several GB of disk; a scene that
-the folder has already is used again.
+MiB by default. Builds it with --memory 64MiB and with the default. Checks that the peak of resident
+memory is at most 64 MiB above the limit, by the build's report and by the system's own measurement,
+and that the files are equal. Takes some minutes and several GB of disk; a scene that the folder has
+already is used again.
 """
 
 import argparse

@@ -5,8 +5,8 @@
                                [--resolution 65536]
 
 Writes a hilly terrain of random points with colors (LAS 1.2, point format 2): 1.3 GB by default.
-Builds it with --memory 256MiB and with the default. What must hold: the peak of resident memory is
-at most 64 MiB above the limit, by the build's report and by the system's own measurement, and the
+Builds it with --memory 256MiB and with the default. Checks that the peak of resident memory is at
+most 64 MiB above the limit, by the build's report and by the system's own measurement, and that the
 files are equal. Takes some minutes and several GB of disk; a scene that the folder has already is
 used again.
 """
@@ -23,7 +23,7 @@ from pathlib import Path
 from memory_promise import MIB, holds
 
 BUDGET = 256 * MIB
-EXTENT = 1_000_000  # of the terrain, in thousandths of a unit
+EXTENT = 1_000_000  # edge of the terrain, in thousandths of a unit
 WINDOW = 1 << 16  # points that are packed in one step
 RECORD = struct.Struct("<3i8x3H")  # position, other members, color
 

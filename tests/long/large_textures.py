@@ -5,8 +5,8 @@
 
 Writes a scene of 21 walls, each with a separate PNG: one of 16384 x 16384 texels, of which every
 eighth row is different, and 20 of 4096 x 4096. Decoded they are 2.4 GB, as pyramids 6.4 GB. Builds
-it with --memory 64MiB, 256MiB and the default. What must hold: the peak of resident memory is at
-most 64 MiB above the limit, and the files are equal. Takes 8 GB of disk and some minutes; a scene
+it with --memory 64MiB, 256MiB and the default. Checks that the peak of resident memory is at most
+64 MiB above the limit, and that the files are equal. Takes 8 GB of disk and some minutes; a scene
 that the folder has already is used again.
 """
 

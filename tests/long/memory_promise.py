@@ -7,7 +7,7 @@ import sys
 import tempfile
 
 MIB = 1 << 20
-ALLOWANCE = 64 * MIB  # of the promise of --memory
+ALLOWANCE = 64 * MIB  # resident memory that --memory allows in addition to its value
 
 
 def holds(build_command, budgets):

@@ -5,14 +5,17 @@
 
 The commands build scenes (also with large progressive JPEG and interlaced PNG images), resume them,
 extract, export in every format, render, generate, verify and plan. Each gets SIGINT, SIGTERM or
-SIGHUP at a random moment of the time that it takes undisturbed. What must hold:
+SIGHUP at a random moment of the time that it takes undisturbed. The script checks these
+requirements:
 
-  - the command ends within --limit seconds of the signal, with exit status 130, or it had ended;
-  - it leaves no output, no temporary file and no temporary folder, except the files of a build
-    that can be resumed;
-  - after all signals, every build resumes and has the SHA-256 of an undisturbed one.
+  - The command ends within --limit seconds of the signal, with exit status 130. Or it had already
+    ended when the signal was sent.
+  - It leaves no output, no temporary file and no temporary folder, except the files of a build
+    that can be resumed.
+  - After all signals, every build resumes and has the SHA-256 of an undisturbed build.
 
-Prints the longest wait of each command and of all; exit status 1 if anything does not hold.
+Prints the longest wait of each command and of all. The exit status is 1 if a requirement is
+violated.
 """
 
 import argparse
@@ -35,7 +38,7 @@ SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
 
 
 def png(width, height):
-    """An interlaced image of zeros with one bit per pixel: a few KB for 10^8 pixels."""
+    """Returns an interlaced image of zeros with one bit per pixel: a few KB for 10^8 pixels."""
 
     def chunk(kind, data):
         body = kind + data
@@ -48,7 +51,7 @@ def png(width, height):
 
 
 def jpeg(width, height, scans):
-    """A gray progressive image that repeats an empty scan of all coefficients."""
+    """Returns a gray progressive image that repeats an empty scan of all coefficients."""
 
     def segment(marker, data):
         return bytes([255, marker]) + struct.pack(">H", len(data) + 2) + data
@@ -71,7 +74,7 @@ def jpeg(width, height, scans):
 
 
 def textured_triangle(image, mime):
-    """A .glb of one triangle with an image."""
+    """Returns a .glb file of one triangle with an image."""
     data = struct.pack("<9f6f", 0, 0, 0, 1, 0, 0, 0, 1, 0.5, 0, 0, 1, 0, 0, 1)
     views = [(0, 36), (36, 24), (60, len(image))]
     data += image + bytes(-len(image) % 4)
@@ -175,7 +178,7 @@ class Run:
             )
 
     def measure(self, command):
-        """Measures the undisturbed command. Returns False if this program lacks it."""
+        """Measures the undisturbed command. Returns False if the program was built without it."""
         begin = time.monotonic()
         process = self.start(command.arguments)
         try:
@@ -216,7 +219,7 @@ class Run:
         command.waits.append(time.monotonic() - begin)
         self.check(command, before, process.returncode, number, err)
         if self.random.random() < 0.5:
-            self.clean()  # otherwise the next build resumes
+            self.clean()  # otherwise the next build would resume this one
         return None
 
     def check(self, command, before, status, number, err):

@@ -6,13 +6,15 @@
 
 Each client repeats, chosen by its seed: upload a scene, submit a job, follow its events, download
 and compare the result, cancel, suspend and resume, retry, delete. Every KILL-EVERY minutes the
-service is killed (SIGKILL) and immediately started again on the same data. What must hold:
+service is killed (SIGKILL) and immediately started again on the same data. The script checks these
+requirements:
 
-  - a result has the SHA-256 that a build without a service gives, and so have its bytes;
-  - a job that was acknowledged is never lost, and none fails;
-  - memory and file descriptors of the service do not grow from the first quarter to the last.
+  - The SHA-256 of a result, as the service reports it and as computed from the downloaded bytes, is
+    the same as without a service.
+  - No acknowledged job is lost, and no job fails.
+  - Memory and file descriptors of the service do not grow from the first quarter to the last.
 
-Prints a line per minute; exit status 1 if anything does not hold.
+Prints a line per minute. The exit status is 1 if a requirement is violated.
 """
 
 import argparse

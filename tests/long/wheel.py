@@ -4,10 +4,11 @@
     tests/long/wheel.py [--folder DIR]
 
 Builds the wheel of this checkout with `pip wheel`, which compiles the complete library, in a
-separate build folder. What must hold: the wheel has the name and the tags that this Python needs
-(cp312-abi3 from 3.12 on, before that one for each version), the package with its types and the
-license, and no other file. Installed, it runs the program at the top of docs/python.md in an empty
-folder, which makes a picture of something, and mypy knows its types. Needs PyPI.
+separate build folder. Checks that the wheel has the name and the tags that this Python needs
+(cp312-abi3 from 3.12 on, before that one tag for each version), and that it contains the package
+with its types, the license, and no other file. Then installs the wheel, runs the program at the top
+of docs/python.md in an empty folder, and checks that the program's picture is not empty and that
+mypy knows the package's types. Needs PyPI.
 """
 
 import argparse

@@ -24,7 +24,7 @@ SKIPPED = 77
 def generate(server, folder):
     document = folder / "openapi.json"
     document.write_bytes(server.get("/openapi.json"))
-    # The generator formats its output with ruff unless it has no such commands to run.
+    # Without this setting, the generator would run ruff to format its output.
     (folder / "config.yml").write_text("post_hooks: []\n", encoding="utf-8")
     done = subprocess.run(
         [
@@ -37,14 +37,15 @@ def generate(server, folder):
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    # The generator leaves out the picture, whose type it does not know, and nothing else.
+    # The generator does not know the type of the picture, so it leaves out this request, but no
+    # other.
     warnings = [line for line in done.stdout.splitlines() if "WARNING" in line]
     assert all("preview.png" in line for line in warnings), done.stdout
     sys.path.insert(0, str(folder))
 
 
 def run_job(url):
-    """The lines of docs/api.md: submit, follow, read the result."""
+    """Submits a job, follows it and reads the result, as docs/api.md describes."""
     from generated_client import Client
     from generated_client.api.jobs import get_job, list_jobs, post_job
     from generated_client.api.results import get_report

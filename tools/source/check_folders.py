@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Checks the structure of the tree (docs/architecture.md) over all tracked files.
 
-The permitted includes of every folder; no cycle between folders; third-party headers in their one
-place; the size of files and folders. Prints one line per finding, as "file:line: problem";
-exits 1 if there is any.
+Each folder may include only permitted folders, there is no cycle of includes between folders, each
+third-party header is included only in permitted folders, and files and folders have at most their
+maximum size. Prints one line per finding, as "file:line: problem". Exits 1 if there is a finding.
 """
 
 import collections
@@ -48,19 +48,20 @@ INCLUDES = PRODUCT_INCLUDES | {
     "include": [],
     "examples": [],
 }
-# Installed headers. Every folder may include them by this prefix; they include each other and the
-# standard library.
+# Prefix of the installed headers. Every folder may include these headers. They include only each
+# other and the standard library.
 INSTALLED_PREFIX = "voxdag/"
-# Folders that others include through these headers only.
+# Other folders may include these folders only through these headers.
 PUBLIC_HEADERS = {"merge": ["merge/merge.h", "merge/load/scratch_file.h"]}
 # Tests and benchmarks may include more than the public header.
 BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
-# Folders that include another folder through these headers only. Other folders include more of it.
+# For some pairs of a folder and a folder that it includes: the only headers that it may include.
+# Other folders may include more headers of that folder.
 PUBLIC_HEADERS_TO = {("scheduler", "query"): ["query/reorder/order_levels.h"]}
 
-# Folders whose inner folders are in layers: an inner folder includes only itself and folders that
-# are further down its list.
+# Folders with layers of inner folders. An inner folder may include only itself and the inner
+# folders that follow it in the list.
 LAYERS = {
     "merge": [
         "merge",

@@ -17,7 +17,8 @@ import subprocess
 import sys
 
 MAX_PER_1000 = 6
-# A folder with fewer lines of prose counts as this many, so that one finding does not fail it.
+# If a folder has fewer lines of prose, its rate is computed for this number of lines. Otherwise a single finding
+# would make the check fail for a small folder.
 MIN_LINES = 200
 
 VERBS = (

@@ -18,7 +18,8 @@ EACH = (
     "|minute|hour|day|worker|thread|core|client|connection|request|doubling"
 )
 
-# The standard term, and the pattern it replaces: inside identifiers as well, unless \b says otherwise.
+# Each rule is a standard term and the pattern of the words that it replaces. A pattern also matches a part of an
+# identifier, unless \b prevents this.
 RULES = [
     (
         "max_, min_, kMax, kMin",

@@ -4,9 +4,9 @@
     tools/source/draw_folders.py            writes the picture
     tools/source/draw_folders.py --check    exits 1 if the picture is not up to date
 
-An arrow that follows from two others (a includes b, b includes c, so a may see c) is left out, so
-that the picture shows the layers. tests, bench and docs include everything and are left out, and so
-are the installed headers, which everything includes.
+If a folder a includes b, and b includes c, an arrow from a to c is left out, so that the picture
+shows the layers. The folders tests, bench and docs are left out, because they include all folders.
+The installed headers are left out, because all folders include them.
 """
 
 import collections
