@@ -89,8 +89,9 @@ auto with_option_names(const auto& work) {
   try {
     return work();
   } catch (const FieldError& error) {
-    throw Error(ErrorCode::kInvalidInput,
-                option_name(error.field.c_str()) + ": expected " + error.expectation);
+    throw Error(ErrorCode::kInvalidInput, option_name(error.field.c_str()) +
+                                              " is not valid with the given options: expected " +
+                                              error.expectation);
   }
 }
 

@@ -40,8 +40,9 @@ ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
 std::unique_ptr<FileLock> lock_folder(FileSystem& files, const std::string& folder) {
   auto lock = files.try_lock(folder + "/lock");
   if (!lock)
-    throw Error(ErrorCode::kInvalidInput,
-                folder + ": another service uses this data folder: expected a folder of its own");
+    throw Error(ErrorCode::kInvalidInput, folder +
+                                              ": another service uses this data folder: expected a "
+                                              "data folder that no other service uses");
   return lock;
 }
 

@@ -121,7 +121,8 @@ void run(const PublishCommand& command, CommandContext& context) {
   if (!command.check.empty()) return check(command, context);
   if (command.input.empty() || command.output.empty())
     throw Error(ErrorCode::kInvalidInput,
-                "a .vdag file and --output DIR are required, or --check DIR");
+                "the input or the output is missing: expected a .vdag file and --output DIR, or "
+                "--check DIR");
   query::PackageSpec spec;
   spec.output = command.output;
   spec.colors = !command.gray;

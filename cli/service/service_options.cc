@@ -56,7 +56,8 @@ void ServiceOptions::with_service(CommandContext& context,
     action(service);
   } catch (const Json::exception&) {
     throw Error(ErrorCode::kIo,
-                "server " + url_ + ": unexpected answer: expected the voxdag API v1");
+                "server " + url_ +
+                    ": the answer is not an answer of the voxdag API: expected the voxdag API v1");
   }
 }
 

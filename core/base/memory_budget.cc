@@ -32,10 +32,10 @@ bool MemoryBudget::try_charge(uint64_t bytes) {
 
 void MemoryBudget::charge(uint64_t bytes, std::string_view what) {
   if (try_charge(bytes)) return;
-  throw Error(ErrorCode::kOutOfMemory, "out of memory: " + std::string(what) + " needs " +
-                                           size_text(bytes) + ", " + size_text(available()) +
-                                           " of a budget of " + size_text(limit_) +
-                                           " are free: expected a larger memory budget (--memory)");
+  throw Error(ErrorCode::kOutOfMemory,
+              "out of memory: " + std::string(what) + " needs " + size_text(bytes) + ", but only " +
+                  size_text(available()) + " of the budget of " + size_text(limit_) +
+                  " are free: expected a larger memory budget (--memory)");
 }
 
 void MemoryBudget::release(uint64_t bytes) {

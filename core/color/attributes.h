@@ -142,12 +142,13 @@ constexpr uint32_t value_bytes(Attribute attribute, uint64_t names) {
   return names <= 256 ? 1 : names <= 65536 ? 2 : 4;
 }
 
-// Returns null if a stored value is valid. Otherwise returns the violated expectation, such as
-// "expected bytes up to 254", for an error message. `names` is the length of the list of names.
+// Returns null if a stored value is valid. Otherwise returns the problem and the expectation, for
+// an error message. `names` is the length of the list of names.
 constexpr const char* value_error(Encoding encoding, uint32_t value, uint64_t names) {
   if (encoding == Encoding::kOctahedral && ((value & 255) == 255 || value >> 8 == 255))
-    return "expected bytes up to 254";
-  if (encoding == Encoding::kNameIndex && value >= names) return "expected an index of the list";
+    return "a byte of the normal is 255, expected at most 254";
+  if (encoding == Encoding::kNameIndex && value >= names)
+    return "it is not an index of the list of names, expected one";
   return nullptr;
 }
 

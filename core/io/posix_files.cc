@@ -65,7 +65,7 @@ int open_to_change(const char* call, const std::string& path, Contents contents)
   if (fd < 0) fail(call, path, errno);
   Descriptor opened(fd);
   struct stat s {};
-  if (fstat(fd, &s) != 0) fail("read the properties of", path, errno);
+  if (fstat(fd, &s) != 0) fail("check the type of", path, errno);
   if (S_ISREG(s.st_mode) && s.st_nlink > 1) refuse("a file with several names (hard links)");
   if (!S_ISREG(s.st_mode) && !S_ISCHR(s.st_mode)) refuse("not a regular file");
   if (contents == Contents::kEmpty && s.st_size > 0 && ftruncate(fd, 0) != 0)
@@ -86,9 +86,10 @@ class PosixReadableFile : public ReadableFile {
     if (fd_.get() < 0 && errno == ELOOP && more_flags == O_NOFOLLOW) refuse_link(path);
     if (fd_.get() < 0) fail("open", path, errno);
     struct stat s {};
-    if (fstat(fd_.get(), &s) != 0) fail("read the properties of", path, errno);
+    if (fstat(fd_.get(), &s) != 0) fail("check the type of", path, errno);
     if (!S_ISREG(s.st_mode))
-      throw Error(ErrorCode::kInvalidInput, path + " is not a regular file: expected one");
+      throw Error(ErrorCode::kInvalidInput,
+                  path + " is not a regular file: expected a file, not a folder, pipe or device");
     const auto nanoseconds = [](const timespec& t) {
       return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
     };
@@ -148,7 +149,7 @@ class PosixWritableFile : public WritableFile {
   void sync() override {
     struct stat s {};
     constexpr off_t kPieceBytes = off_t{8} << 20;
-    if (fstat(fd_.get(), &s) != 0) fail("read the properties of", path_, errno);
+    if (fstat(fd_.get(), &s) != 0) fail("find the size of", path_, errno);
     for (off_t at = 0; at < s.st_size; at += kPieceBytes)
       sync_file_range(
           fd_.get(), at, kPieceBytes,
@@ -195,7 +196,7 @@ class PosixFileSystem : public FileSystem {
     struct stat s {};
     if (stat(path.c_str(), &s) == 0) return true;
     if (errno == ENOENT || errno == ENOTDIR) return false;
-    fail("read the properties of", path, errno);
+    fail("look for", path, errno);
   }
   void rename(const std::string& from, const std::string& to) override {
     if (::rename(from.c_str(), to.c_str()) != 0) fail("rename", from + " to " + to, errno);
@@ -279,7 +280,7 @@ class PosixFileSystem : public FileSystem {
   }
   uint64_t device(const std::string& path) override {
     struct stat s {};
-    if (stat(path.c_str(), &s) != 0) fail("read the properties of", path, errno);
+    if (stat(path.c_str(), &s) != 0) fail("find the disk of", path, errno);
     return s.st_dev;
   }
 };

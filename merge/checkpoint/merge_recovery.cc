@@ -62,10 +62,10 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
                     " bytes that this run has for a part of the merge: expected as much memory as "
                     "before (--memory), or --restart");
   if (state.narrow_words != out.narrow_words())
-    throw Error(ErrorCode::kCorrupt, "the interrupted merge has wide levels above " +
+    throw Error(ErrorCode::kCorrupt, "the interrupted merge made levels wide if they have over " +
                                          std::to_string(state.narrow_words) +
-                                         " words: expected above " +
-                                         std::to_string(out.narrow_words()) + " as in this merge");
+                                         " words: expected over " +
+                                         std::to_string(out.narrow_words()) + ", as in this merge");
   auto file = std::make_unique<ScratchFile>(context_.scratch, state.map);
   saver_.add_named(file->path());
   uint64_t map_rows = 0;

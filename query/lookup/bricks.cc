@@ -32,7 +32,7 @@ uint64_t mask_within(const Region& region, const Position& low) {
 
 void check_grid_levels(const DagView& dag, uint32_t grid_levels) {
   if (grid_levels > dag.grid_levels())
-    throw Error(ErrorCode::kInvalidInput, "a grid of 2^" + std::to_string(grid_levels) +
+    throw Error(ErrorCode::kInvalidInput, "the selected grid has 2^" + std::to_string(grid_levels) +
                                               " cells per edge, expected at most 2^" +
                                               std::to_string(dag.grid_levels()));
 }

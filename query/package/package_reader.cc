@@ -49,7 +49,8 @@ PackageReader::PackageReader(FileSystem& files, const std::string& folder)
                       ": expected a whole number from " + std::to_string(kBrickLevels) + " to " +
                       std::to_string(kMaxGridLevels));
   if (manifest.value("tile_levels", nlohmann::json()) != kPackageTileLevels)
-    corrupt(path, "'tile_levels' of the manifest: expected " + std::to_string(kPackageTileLevels));
+    corrupt(path, "'tile_levels' of the manifest is not valid: expected " +
+                      std::to_string(kPackageTileLevels));
   grid_levels_ = levels.get<uint32_t>();
   for (const PackageBand& band : index_.bands)
     if (band.is_color ? band.level > grid_levels_ : band.level + kBrickLevels >= grid_levels_)
@@ -133,8 +134,10 @@ PackageReader::PlacedBand PackageReader::find_band(bool is_color, uint32_t level
     if (band.is_color == is_color && band.level == level) return {band, first};
     first += band.blocks;
   }
-  throw Error(ErrorCode::kNotFound, folder_ + ": level " + std::to_string(level) + ": expected a " +
-                                        (is_color ? "level with colors" : "level with tiles"));
+  throw Error(ErrorCode::kNotFound,
+              folder_ + ": level " + std::to_string(level) +
+                  (is_color ? " has no color pages: expected a level with colors"
+                            : " has no tiles: expected a level with tiles"));
 }
 
 std::string PackageReader::name_of(uint64_t block) const {
@@ -153,7 +156,8 @@ std::vector<uint32_t> PackageReader::tile(uint32_t level, uint64_t number) const
   const PlacedBand band = find_band(false, level);
   if (number >= band.band.items)
     throw Error(ErrorCode::kNotFound, folder_ + ": tile " + std::to_string(number) + " of level " +
-                                          std::to_string(level) + ": expected a number below " +
+                                          std::to_string(level) +
+                                          " does not exist: expected a number below " +
                                           std::to_string(band.band.items));
   const uint64_t at = band.first + number / kBlockTiles,
                  count = std::min<uint64_t>(kBlockTiles,

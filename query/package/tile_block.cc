@@ -28,7 +28,7 @@ class Columns {
   explicit Columns(std::string_view bytes) : left_(bytes) {}
 
   std::string_view take(size_t count) {
-    if (count > left_.size()) refuse_block("expected more bytes");
+    if (count > left_.size()) refuse_block("it ends too early, expected all columns");
     const std::string_view column = left_.substr(0, count);
     left_.remove_prefix(count);
     return column;
@@ -45,7 +45,7 @@ class Columns {
     return numbers;
   }
   void expect_end() const {
-    if (!left_.empty()) refuse_block("expected no bytes after the last column");
+    if (!left_.empty()) refuse_block("bytes follow after the last column, expected none");
   }
 
  private:
@@ -140,7 +140,7 @@ class TileBuilder {
 size_t children_of(std::string_view masks) {
   size_t children = 0;
   for (const char mask : masks) {
-    if (mask == 0) refuse_block("expected nodes with children");
+    if (mask == 0) refuse_block("a node has no children, expected at least one");
     children += static_cast<size_t>(std::popcount(static_cast<unsigned char>(mask)));
   }
   return children;
@@ -154,17 +154,19 @@ void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next
   size_t old_count = 0;
   for (size_t i = 0; i < leaves.size(); ++i) old_count += static_cast<size_t>(old(i));
   for (size_t i = leaves.size(); i < 8 * is_old.size(); ++i)
-    if (old(i)) refuse_block("expected no references after the last leaf");
+    if (old(i)) refuse_block("a reference follows after the last leaf, expected none");
   const std::vector<uint64_t> distances = columns.take_numbers(4, old_count);
   size_t at = 0;
   for (size_t i = 0; i < leaves.size(); ++i) {
     if (old(i)) {
       const uint64_t distance = distances[at++];
-      if (distance == 0 || distance > next) refuse_block("expected numbers of earlier tiles");
+      if (distance == 0 || distance > next)
+        refuse_block(
+            "an old reference leads to no earlier tile, expected the number of an earlier tile");
       leaves[i].number = next - static_cast<uint32_t>(distance);
     } else {
       leaves[i].number = next++;
-      if (next == 0) refuse_block("expected fewer tiles");
+      if (next == 0) refuse_block("the numbers of its tiles exceed 32 bits, expected fewer tiles");
     }
   }
 }
@@ -234,7 +236,7 @@ TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32
   }
   std::vector<Leaf> leaves;
   for (const uint64_t mask : columns.take_numbers(8, nodes)) {
-    if (mask == 0) refuse_block("expected leaves with cells");
+    if (mask == 0) refuse_block("a leaf has no cells, expected at least one");
     leaves.push_back({mask, 0});
   }
   if (!bricks) read_references(columns, leaves, block.next);

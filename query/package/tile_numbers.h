@@ -37,7 +37,8 @@ class TileNumbers {
     const uint64_t node = nodes_.find(offset);
     if (node == NodeIndex::kNone)
       throw Error(ErrorCode::kCorrupt, path_ + ": level " + std::to_string(level_) + ", word " +
-                                           std::to_string(offset) + ": expected a node");
+                                           std::to_string(offset) +
+                                           ": no node begins here, expected one");
     uint32_t& number = numbers_[node];
     if (number == 0) {
       offsets_.add(offset);

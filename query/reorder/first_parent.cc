@@ -117,7 +117,7 @@ std::span<const uint32_t> root_words(DagInput& input) {
   LevelCursor root(input, 0);
   const std::span<const uint32_t> words = root.words();
   if (words.size() != input.level(0).word_count)
-    input.corrupt(0, words.size(), "a second root: expected one");
+    input.corrupt(0, words.size(), "a second root begins here: expected one root");
   return words;
 }
 
@@ -170,7 +170,8 @@ std::unique_ptr<WordQueue> FirstParentOrder::write_in_memory(uint32_t level,
     for (int i = 0; i < node.children; ++i) {
       const uint64_t offset = below.find(node.pointer(i), place_next);
       if (offset >= next->words())
-        input_.corrupt(level + 1, node.pointer(i), "no node begins here, but a pointer does");
+        input_.corrupt(level + 1, node.pointer(i),
+                       "no node begins here, but a pointer refers to it");
       out.add_pointer(offset);
     }
   });
@@ -237,7 +238,7 @@ void FirstParentOrder::write_levels() {
     next->finish();
     if (next->words() != below.word_count)
       input_.corrupt(level + 1, next->words(),
-                     "nodes from here on would have no parent: expected at least one for each");
+                     "the nodes from here on have no parent: expected at least one for each");
     queue = std::move(next);
     progress_.advance(input_.level(level).node_count);
   }

@@ -25,15 +25,17 @@ void check_address(const voxdag_reader::File& file, const ColorPageAddress& page
     throw Error(ErrorCode::kNotFound, "the file has no colors: expected a file built with colors");
   const uint32_t levels = file.color_levels();
   if (page.level > levels)
-    throw Error(ErrorCode::kNotFound, "colors of level " + std::to_string(page.level) +
-                                          ": expected 0 to " + std::to_string(levels));
+    throw Error(ErrorCode::kNotFound, "level " + std::to_string(page.level) +
+                                          " has no colors: expected a level from 0 to " +
+                                          std::to_string(levels));
   const uint64_t edge = uint64_t{1} << (page.level - std::min(page.level, kPageLevels));
   const auto& [x, y, z] = page.position;
   if (x >= edge || y >= edge || z >= edge)
-    throw Error(ErrorCode::kNotFound,
-                "color page " + std::to_string(x) + "." + std::to_string(y) + "." +
-                    std::to_string(z) + " of level " + std::to_string(page.level) +
-                    ": expected each number to be 0 to " + std::to_string(edge - 1));
+    throw Error(ErrorCode::kNotFound, "color page " + std::to_string(x) + "." + std::to_string(y) +
+                                          "." + std::to_string(z) + " of level " +
+                                          std::to_string(page.level) +
+                                          " is outside the grid: expected each number to be 0 to " +
+                                          std::to_string(edge - 1));
 }
 
 // Returns the position of a cell of the page from its Morton code within the page.

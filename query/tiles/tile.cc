@@ -23,7 +23,7 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
   };
   if (!has_level)
     throw Error(ErrorCode::kNotFound,
-                "level " + std::to_string(root.level) + ": expected a level below " +
+                "level " + std::to_string(root.level) + " has no tiles: expected a level below " +
                     std::to_string(dag.empty() ? 0 : dag.grid_levels() - kBrickLevels) +
                     ", the number of levels with nodes");
   if (!is_node())

@@ -138,8 +138,10 @@ class RegionComparison {
       throw Error(ErrorCode::kCorrupt,
                   file_.path() + ": the " + traits_of(attribute).plural +
                       " of the region at color cell " + place_of(region.cube, grid_) +
-                      " differ from the scene's (" + std::to_string(stored.counts[0]) +
-                      " cells in the file, " + std::to_string(baked.counts[0]) + " in the scene)");
+                      " differ from the scene: expected the values that a build of the scene "
+                      "stores (the region has " +
+                      std::to_string(stored.counts[0]) + " cells in the file and " +
+                      std::to_string(baked.counts[0]) + " in the scene)");
     return false;
   }
 

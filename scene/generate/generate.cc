@@ -50,20 +50,20 @@ void check(const GenerateOptions& options) {
   const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
   if (options.instances && !has_parts)
     throw Error(ErrorCode::kInvalidInput, "a scene of the kind " + name +
-                                              " has no repeated parts to write as instances: "
-                                              "expected the kind city or spheres");
+                                              " has no repeated parts, so --instances is not "
+                                              "possible: expected the kind city or spheres");
   if (options.colors && scene_kind(options.kind).materials.empty())
     throw Error(ErrorCode::kInvalidInput, "a scene of the kind " + name +
                                               " cannot have colors: expected the kind city, or no "
-                                              "colors");
+                                              "--colors");
   if (options.colors && options.instances)
     throw Error(ErrorCode::kInvalidInput,
-                "colors and instances were both given, but instances of a part share one color: "
-                "expected one of them");
+                "--colors and --instances were both given, but all instances of a part would have "
+                "the same colors: expected only one of the two");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
-    throw Error(ErrorCode::kInvalidInput, "the size of menger is its level, not " +
+    throw Error(ErrorCode::kInvalidInput, "menger has no number of triangles, but --triangles is " +
                                               std::to_string(options.triangles) +
-                                              " triangles: expected a level");
+                                              ": expected --level");
   check_size(options);
 }
 

@@ -140,10 +140,9 @@ void expect_unchanged(FileSystem& files, const ImageSource& source) {
   try {
     const ImageBytes opened(files, source);
   } catch (const BrokenImage& broken) {
-    throw Error(ErrorCode::kInvalidInput,
-                source.name +
-                    " changed during the build: expected a file that does not change, but it " +
-                    broken.message);
+    throw Error(ErrorCode::kInvalidInput, source.name + " changed during the build (it " +
+                                              broken.message +
+                                              "): expected a file that does not change");
   }
 }
 
@@ -256,8 +255,9 @@ class TextureSet::Builder {
     const std::string folder = parent_directory(path);
     if (const uint64_t free_bytes = files_.free_space(folder); set_->bytes() > free_bytes)
       throw Error(ErrorCode::kNoSpace, "the decoded images take " + size_text(set_->bytes()) +
-                                           " of disk space, " + folder + " has " +
-                                           size_text(free_bytes) + " free");
+                                           " of disk space, but " + folder + " has only " +
+                                           size_text(free_bytes) +
+                                           " free: expected more free space");
     writer_ = files_.create(path);
     set_->file_ = files_.open_read(path);
     set_->checksums_ = PageBuffer<uint32_t>(budget_, pages, "checksums of textures");

@@ -19,8 +19,9 @@ std::string this_program() {
   if (!std::filesystem::exists(path))
     throw Error(ErrorCode::kInvalidInput,
                 path +
-                    ": this program was replaced or removed while running: expected it, or its "
-                    "path on the nodes, for the tasks of the cluster");
+                    ": the file of the running program was replaced or removed, so the tasks of "
+                    "the cluster cannot run it: expected the file to exist, or the path of the "
+                    "program on the nodes (cluster.program)");
   return path;
 }
 

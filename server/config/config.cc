@@ -106,7 +106,8 @@ void read_config(FileSystem& files, const std::string& path, ServerConfig& confi
   try {
     set_options(FieldJson::parse(text), "the file", config);
   } catch (const nlohmann::json::exception& error) {
-    throw Error(ErrorCode::kInvalidInput, path + ": expected JSON; " + std::string(error.what()));
+    throw Error(ErrorCode::kInvalidInput, path + " is not JSON (" + error.what() +
+                                              "): expected a JSON object with the settings");
   } catch (const Error& error) {
     throw Error(error.code(), path + ": " + error.message());
   }
@@ -117,7 +118,8 @@ void check_config(const ServerConfig& config) {
   const auto expect = [](bool holds, const std::string& what) {
     if (!holds) throw Error(ErrorCode::kInvalidInput, what);
   };
-  expect(!config.data_folder.empty(), "no data folder: expected one (--data DIR, data_folder)");
+  expect(!config.data_folder.empty(),
+         "no data folder was given: expected one (--data DIR, data_folder)");
   expect(config.http.port >= 0 && config.http.port <= 65535,
          "port " + std::to_string(config.http.port) + ": expected 0 to 65535");
   expect(config.http.certificate_file.empty() == config.http.key_file.empty(),
@@ -145,7 +147,9 @@ void check_config(const ServerConfig& config) {
          "jobs.cache is " + size_text(config.jobs.cache_bytes) +
              ": expected no cache with cluster.engine, because builds of a cluster do not use it");
   for (const std::string& root : config.scene_roots)
-    expect(root.starts_with('/'), "scene_roots: '" + root + "': expected an absolute folder");
+    expect(root.starts_with('/'),
+           "scene_roots: '" + root +
+               "' is not an absolute path: expected the path of a folder that begins with /");
   for (const std::string& origin : config.embed_origins)
     expect(is_origin(origin), "embed_origins: '" + origin + "': " + kExpectedOrigin);
   for (const std::string& origin : config.cors_origins)

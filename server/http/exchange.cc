@@ -102,7 +102,8 @@ bool Exchange::answer(Response response, bool last) {
   const size_t bytes = memory_of(response);
   const bool reserves = bytes > kSmallAnswerBytes;
   if (reserves && !connection_.reserve_answer(bytes))
-    response = problem_response(busy("too many large answers are being sent"));
+    response = problem_response(
+        busy("too many large answers are being sent: expected the request again later"));
   response.build_permit.reset();
   const bool keep_alive = !last && head_.keep_alive && body_ && body_->is_complete();
   const bool sent = send(response, answer_head(response, keep_alive));

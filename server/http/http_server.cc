@@ -22,7 +22,8 @@ namespace {
 
 // Answers a connection that exceeds the limit with status 503, in one nonblocking write.
 void send_busy(int socket) {
-  const std::string body = problem_json(busy("too many connections"));
+  const std::string body =
+      problem_json(busy("too many connections are open: expected a new connection later"));
   const std::string text =
       "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/problem+json\r\n"
       "Retry-After: 2\r\nConnection: close\r\nContent-Length: " +

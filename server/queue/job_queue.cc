@@ -212,7 +212,7 @@ std::optional<Job> job_of_key(SqlDatabase& database, const IdempotencyKey& key) 
 
 RequestError no_job(const std::string& id) {
   return {RequestError::Kind::kNotFound,
-          "no job " + id.substr(0, 32) + ": expected the id of a job that was not deleted"};
+          "no such job: '" + id.substr(0, 32) + "': expected the id of a job that was not deleted"};
 }
 
 void expect_ended(const std::optional<Job>& job, const std::string& id) {

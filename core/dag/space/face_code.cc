@@ -92,7 +92,8 @@ class FaceEncoder {
 
 [[noreturn]] void refuse_face() {
   throw Error(ErrorCode::kCorrupt,
-              "the labels of a subvolume's face are damaged: expected a quadtree");
+              "the stored labels of the empty space at a face of a subvolume are damaged: expected "
+              "a complete quadtree of labels");
 }
 
 }  // namespace

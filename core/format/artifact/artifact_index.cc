@@ -112,7 +112,7 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
                       std::to_string(children) + " children, expected " +
                       std::to_string(level.rows) + " and " + std::to_string(level.children));
   if (rows == 0 || rows > uint64_t{1} << 32)
-    corrupt(here, std::to_string(rows) + " rows, expected 1 to 2^32");
+    corrupt(here, "the level has " + std::to_string(rows) + " rows, expected 1 to 2^32");
 }
 
 }  // namespace
@@ -159,7 +159,7 @@ std::vector<std::byte> encode_index(const ArtifactIndex& index) {
 void check_index_bytes(const ArtifactRef& ref, const std::string& where) {
   const uint64_t bytes = ref.offset + ref.bytes - ref.index_offset;
   if (bytes > kMaxIndexBytes)
-    corrupt(where, "an index of " + std::to_string(bytes) + " bytes, expected at most " +
+    corrupt(where, "the index has " + std::to_string(bytes) + " bytes, expected at most " +
                        std::to_string(kMaxIndexBytes));
 }
 
@@ -179,13 +179,14 @@ ArtifactIndex decode_index(std::span<const std::byte> bytes, const ArtifactRef& 
   const uint64_t frames = source.get<uint32_t>();
   const uint64_t frame_bytes = source.get<uint64_t>();
   if (index.shape.grid_levels < kMinGridLevels || index.shape.grid_levels > kMaxGridLevels)
-    corrupt(where, "a grid of 2^" + std::to_string(index.shape.grid_levels) +
+    corrupt(where, "the index names a grid of 2^" + std::to_string(index.shape.grid_levels) +
                        " voxels per edge, expected 2^" + std::to_string(kMinGridLevels) + " to 2^" +
                        std::to_string(kMaxGridLevels));
   if (index.shape.hash_bits < 4 || index.shape.hash_bits > 64)
-    corrupt(where, std::to_string(index.shape.hash_bits) + " hash bits, expected 4 to 64");
+    corrupt(where, "the index names " + std::to_string(index.shape.hash_bits) +
+                       " hash bits, expected 4 to 64");
   if (levels > index.shape.brick_level() + 1)
-    corrupt(where, std::to_string(levels) + " levels, expected at most " +
+    corrupt(where, "the index has " + std::to_string(levels) + " levels, expected at most " +
                        std::to_string(index.shape.brick_level() + 1));
   // After this check, the size of `bytes` limits all allocations below.
   const uint64_t expected =

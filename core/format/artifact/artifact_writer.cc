@@ -111,7 +111,7 @@ void ArtifactWriter::begin_level(uint32_t level) {
 void ArtifactWriter::append_bricks(std::span<const uint64_t> masks) {
   State& s = *state_;
   if (!s.level_open || s.index.levels.size() != 1)
-    s.broken("expected bricks only while the brick level is open");
+    s.broken("bricks were added at a wrong time: expected them only while the brick level is open");
   while (!masks.empty()) {
     const size_t n = std::min<size_t>(masks.size(), kFrameRows - s.values.size());
     if (n == kFrameRows)
@@ -126,7 +126,9 @@ void ArtifactWriter::append_bricks(std::span<const uint64_t> masks) {
 void ArtifactWriter::append_nodes(const NodeLevelView& rows) {
   State& s = *state_;
   if (!s.level_open || s.index.levels.size() < 2)
-    s.broken("expected nodes only while a level above the bricks is open");
+    s.broken(
+        "nodes were added at a wrong time: expected them only while a level above the bricks is "
+        "open");
   if (rows.masks.size() != rows.hashes.size())
     s.broken(std::to_string(rows.masks.size()) + " masks, expected " +
              std::to_string(rows.hashes.size()) + ", the number of hashes");

@@ -153,7 +153,7 @@ const char* decode_node_frame(std::span<const std::byte> bytes, uint32_t rows, u
                               Frame& out) {
   ByteSource source(bytes);
   const uint32_t planes = source.get<uint32_t>();
-  if (planes < 1 || planes > sizeof(uint32_t)) return "expected 1 to 4 child planes";
+  if (planes < 1 || planes > sizeof(uint32_t)) return "its child indices do not have 1 to 4 bytes";
   const auto hashes = source.take(rows * sizeof(uint64_t));
   if (hashes.empty()) return "the hash column is incomplete";
   out.rows = rows;

@@ -184,10 +184,11 @@ void GlobalFileWriter::begin_level(uint32_t level) {
   State& s = *state_;
   if (s.level_open || level + s.levels.size() != s.brick_level())
     throw Error(ErrorCode::kCorrupt, s.path + ": level " + std::to_string(level) +
-                                         " does not follow the " + std::to_string(s.levels.size()) +
-                                         " levels before it, from level " +
-                                         std::to_string(s.brick_level()) + " upward" +
-                                         (s.level_open ? ": another level is not finished" : ""));
+                                         " begins after " + std::to_string(s.levels.size()) +
+                                         " finished levels" +
+                                         (s.level_open ? " and one unfinished level" : "") +
+                                         ": expected the levels one after another, from level " +
+                                         std::to_string(s.brick_level()) + " to level 0");
   s.create_file();
   s.checksummed_words = 0;
   s.level_open = true;

@@ -309,7 +309,7 @@ class File {
     const unsigned char* const page = data();
     static const unsigned char kMagic[8] = {0x89, 'V', 'D', 'A', 'G', '\n', 0x1a, '\n'};
     if (bytes_->size() < sizeof(kMagic) || std::memcmp(page, kMagic, sizeof(kMagic)) != 0)
-      corrupt("not a voxdag file: expected the first bytes of a .vdag file");
+      corrupt("not a voxdag file: expected the signature of a .vdag file in its first 8 bytes");
     if (bytes_->size() < kPageBytes) corrupt("the header is incomplete: expected 4096 bytes");
     version_ = get<uint32_t>(page + 8);
     if (version_ != 1 && version_ != 2)
@@ -318,21 +318,25 @@ class File {
            "fails its checksum");
     const uint64_t features = version_ == 1 ? 0 : get<uint64_t>(page + 2176);
     if (features & ~(kWideLevels | kAttributes))
-      unsupported("feature bits " + str(features) + ", expected only the bits 1 and 2");
+      unsupported("feature bits " + str(features) +
+                  ", expected at most 3: this reader knows only the bits 0 and 1");
     max_pointer_bits_ = features & kWideLevels ? 64 : 32;
     grid_levels_ = get<uint32_t>(page + 16);
     hash_bits_ = get<uint32_t>(page + 20);
     expect(
         get<uint32_t>(page + 12) == kPageBytes && get<uint32_t>(page + 28) == kChecksumBlockBytes,
-        "expected pages of 4096 bytes and checksum blocks of 65536");
+        "the sizes of pages and checksum blocks are not known to this reader, expected 4096 and "
+        "65536 bytes");
     expect(grid_levels_ >= 2 && grid_levels_ <= 20,
-           "resolution 2^" + str(grid_levels_) + ", expected 2^2 to 2^20");
-    expect(hash_bits_ >= 4 && hash_bits_ <= 64, str(hash_bits_) + " hash bits, expected 4 to 64");
+           "the resolution is 2^" + str(grid_levels_) + ", expected 2^2 to 2^20");
+    expect(hash_bits_ >= 4 && hash_bits_ <= 64,
+           "a hash has " + str(hash_bits_) + " bits, expected 4 to 64");
     std::memcpy(origin_, page + 32, sizeof(origin_));
     edge_ = get<double>(page + 56);
     expect(std::isfinite(origin_[0]) && std::isfinite(origin_[1]) && std::isfinite(origin_[2]) &&
                std::isfinite(edge_) && edge_ > 0,
-           "edge " + std::to_string(edge_) + ", expected finite bounds and an edge above 0");
+           "the bounds of the grid, with the edge " + std::to_string(edge_) +
+               ", are not valid, expected finite numbers and an edge above 0");
     voxels_ = get<uint64_t>(page + 64);
     svo_nodes_ = get<uint64_t>(page + 72);
     dag_nodes_ = get<uint64_t>(page + 80);
@@ -374,7 +378,7 @@ class File {
       expect(4 * level.word_count <= bytes_->size() - end, where + "ends beyond the file");
       expect(level.node_count > 0 && level.node_count <= level.word_count / 2,
              where + str(level.node_count) + " nodes in " + str(level.word_count) +
-                 " words, expected 1 to half as many");
+                 " words, expected at least one node and at least two words per node");
       level.words = reinterpret_cast<const uint32_t*>(data() + level.file_offset);
       nodes += level.node_count;
       end = (end + 4 * level.word_count + kPageBytes - 1) / kPageBytes * kPageBytes;
@@ -390,7 +394,8 @@ class File {
   void read_attributes(const unsigned char* page) {
     const uint64_t count = get<uint64_t>(page + 120);
     expect(count >= 1 && count <= 16, str(count) + " attribute sections, expected 1 to 16");
-    expect(dag_nodes_ > 0, "expected no attribute sections, because the scene is empty");
+    expect(dag_nodes_ > 0,
+           "the file has attribute sections, expected none, because the scene is empty");
     uint32_t last_kind = 0;
     for (uint64_t i = 0; i < count; ++i) {
       const unsigned char* const entry = page + 1152 + 64 * i;
@@ -398,8 +403,9 @@ class File {
       const uint64_t at = get<uint64_t>(entry + 8), bytes = get<uint64_t>(entry + 16);
       const std::string where = "attribute section " + str(i) + ": ";
       expect(kind > last_kind, where + "kind " + str(kind) + ", expected over " + str(last_kind));
-      expect(at == table_offset_, where + "byte " + str(at) + ", expected " + str(table_offset_));
-      expect(bytes > 0 && bytes <= bytes_->size() - table_offset_, where + "is not in the file");
+      expect(at == table_offset_,
+             where + "begins at byte " + str(at) + ", expected " + str(table_offset_));
+      expect(bytes > 0 && bytes <= bytes_->size() - table_offset_, where + "ends beyond the file");
       expect(levels >= 2 && levels <= grid_levels_,
              where + "level " + str(levels) + ", expected 2 to " + str(grid_levels_));
       if (kind < kEndOfKinds)
@@ -418,7 +424,8 @@ class File {
     const uint64_t begin = get<uint64_t>(page + 96), count = get<uint64_t>(page + 104);
     expect(begin == table_offset_,
            "the checksum table begins at byte " + str(begin) + ", expected " + str(table_offset_));
-    expect(count == blocks, str(count) + " checksum blocks, expected " + str(blocks));
+    expect(count == blocks,
+           "the file has " + str(count) + " checksum blocks, expected " + str(blocks));
     const uint64_t bytes = bytes_->size() - table_offset_;
     expect(bytes == 8 * blocks,
            "the checksum table has " + str(bytes) + " bytes, expected " + str(8 * blocks));

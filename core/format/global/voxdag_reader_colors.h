@@ -180,7 +180,7 @@ class ColorSection {
     const bool has_names = kKindBlockBytes[kind] == 0;
     const bool is_width = has_names ? block_bytes == 32 || block_bytes == 64 || block_bytes == 128
                                     : block_bytes == kKindBlockBytes[kind];
-    if (!is_width) return "expected blocks of the size that the kind of attribute requires";
+    if (!is_width) return "its blocks do not have the size that the kind of attribute requires";
     kind_ = kind;
     color_levels_ = color_levels;
     tier_count_ = color_levels / 7 + 1;
@@ -195,7 +195,8 @@ class ColorSection {
       tier.cell_count = get<uint64_t>(entry + 24);
       tier.finest_level = color_levels - 7 * t;
       tier.region_level = tier.finest_level - std::min<uint32_t>(tier.finest_level, 6);
-      if (get<uint64_t>(entry) != end) return "a tier does not follow the tier before it";
+      if (get<uint64_t>(entry) != end)
+        return "a tier does not begin at the end of the tier before it";
       if (tier.units > (tables - end) / 16) return "the data of a tier end beyond the section";
       tier.block_bytes = block_bytes;
       tier.data = section + end;
@@ -262,11 +263,12 @@ class ColorSection {
 
  private:
   const char* read_names(const unsigned char* at, uint64_t bytes, uint32_t value_bytes) {
-    const char* const kBroken = "the list of materials does not fit between tiers and tier table";
+    const char* const kBroken =
+        "the list of materials does not fit between the last tier and the tier table";
     const uint64_t count = bytes < 4 ? 0 : get<uint32_t>(at);
     if (count == 0 || 4 * count > bytes - 4) return kBroken;
     if (count > kMaxMaterials || bytes > kMaxNamesBytes)
-      return "expected at most 2^20 materials in a list of at most 64 MiB";
+      return "the list of materials is too long, expected at most 2^20 materials and 64 MiB";
     if (value_bytes != (count <= 256 ? 1u : count <= 65536 ? 2u : 4u))
       return "the values of materials have the wrong width for their number";
     uint64_t end = 4;

@@ -137,7 +137,8 @@ void Verifier::check_header() const {
   uint64_t features = 0;
   if (has_features) std::memcpy(&features, file_.data() + kFeaturesAt, sizeof(features));
   if (has_features && features == 0)
-    broken(file_.path() + ": header", "version 2 without feature bits, expected version 1");
+    broken(file_.path() + ": header",
+           "the version is 2, but no feature bit is set, expected version 1");
   if (has_features && any_wide != ((features & kWideLevels) != 0))
     broken(file_.path() + ": header", "feature bits " + std::to_string(features) +
                                           ", expected the bit of wide levels to be " +
@@ -157,7 +158,9 @@ void Verifier::check_attributes(bool has_attributes) const {
                                           std::to_string(kinds.size()) +
                                           ", the number of known sections in the file");
   if (has_attributes == kinds.empty())
-    broken(file_.path() + ": header", "expected the feature bit of attributes only with sections");
+    broken(file_.path() + ": header",
+           "the feature bit of attributes does not match the attribute table, expected it to be 1 "
+           "if and only if there are attribute sections");
   for (size_t i = 0; i < kinds.size(); ++i)
     check_section(kAttributesAt + i * kAttributeEntryBytes, kinds[i]);
   check_zeros(kAttributesAt + kinds.size() * kAttributeEntryBytes, kFeaturesAt, "a reserved byte");
@@ -185,8 +188,9 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   }
   if (field(kAttributeCellsAt) != cells || field(kAttributeFinestCellsAt) != finest_cells)
     broken(file_.path() + ": header",
-           std::to_string(field(kAttributeCellsAt)) + " " + plural + ", the section has " +
-               std::to_string(cells) + "; " + std::to_string(field(kAttributeFinestCellsAt)) +
+           "the attribute table has " + std::to_string(field(kAttributeCellsAt)) + " " + plural +
+               ", the section has " + std::to_string(cells) + "; " +
+               std::to_string(field(kAttributeFinestCellsAt)) +
                " of them on the finest level, the section has " + std::to_string(finest_cells));
   // End of the section, without the padding up to the next page.
   const uint64_t end = field(kAttributeOffsetAt) + field(kAttributeBytesAt);
@@ -197,7 +201,8 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
     const uint64_t tiers = end - 32 * section.tier_count();
     if (tiers != (names + 15) / 16 * 16 || !section.names().back().empty())
       broken(file_.path() + ": " + plural,
-             "expected a list that ends with an empty name, up to the next multiple of 16 bytes");
+             "the list of names does not end as it must, expected an empty last name, and the tier "
+             "table at the next multiple of 16 bytes");
     check_zeros(names, tiers, "padding after the names of " + plural);
   }
   check_zeros(end, round_up_to_page(end), "padding after the " + plural);

@@ -80,9 +80,10 @@ void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const
     if (child > next)
       throw Error(ErrorCode::kCorrupt,
                   place_in(file, level, at + 1 + (static_cast<uint64_t>(c) << node.wide)) +
-                      "a child at word " + std::to_string(child) +
-                      " before any parent of the node at word " + std::to_string(next) +
-                      ": expected the order by first parent");
+                      "the pointer leads to word " + std::to_string(child) +
+                      ", but no pointer before it leads to the node at word " +
+                      std::to_string(next) +
+                      ": expected the order by first parent (docs/format.md)");
     if (child < next) return;
     const auto children = [&] {
       const voxdag_reader::Node below = verified_node(file, level + 1, next);

@@ -79,8 +79,9 @@ void check_chunks(const ChunksRequest& request) {
 void check_folder(FileSystem& files, const ExportRequest& request) {
   if (!files.exists(request.output) || request.replace || files.list(request.output).empty())
     return;
-  throw Error(ErrorCode::kInvalidInput,
-              request.output + ": the folder is not empty; --force replaces files in it");
+  throw Error(ErrorCode::kInvalidInput, request.output +
+                                            ": the folder is not empty: expected a new or empty "
+                                            "folder, or --force to replace files in it");
 }
 
 class ChunkWriter {

@@ -238,7 +238,7 @@ const VoxelGrid& voxel_grid(const ExportJob& job) {
   const std::string& wanted = job.options.grid;
   const int band = job.options.band;
   if (band != 0 && wanted != "sdf")
-    throw Error(ErrorCode::kInvalidInput, "--band: expected --grid sdf as well");
+    throw Error(ErrorCode::kInvalidInput, "--band is given without --grid sdf: expected both");
   if (band < 0 || band > kMaxBandWidth)
     throw Error(ErrorCode::kInvalidInput, "--band " + std::to_string(band) + ": expected 1 to " +
                                               std::to_string(kMaxBandWidth));

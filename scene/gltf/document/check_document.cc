@@ -37,8 +37,10 @@ void check_view(const Document& d, const BufferView& view, const std::string& wh
     refuse(d.path,
            where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
   if (buffer.kind == BufferSource::Kind::kNone)
-    refuse(d.path,
-           where + ": " + name + " has no uri and is not in the file, expected one of both");
+    refuse(
+        d.path,
+        where + ": " + name +
+            " has no uri and is not in the file, expected a uri, or a GLB file with the chunk BIN");
 }
 
 void check_extent(const Document& d, const Extent& extent, const std::string& where) {
@@ -71,7 +73,7 @@ void check_sparse(const Document& d, const Accessor& accessor, const std::string
     refuse(d.path, where +
                        ": its sparse indices are not unsigned integers, but of the component "
                        "type " +
-                       std::to_string(sparse.index_type));
+                       std::to_string(sparse.index_type) + ", expected 5121, 5123 or 5125");
   const auto index_bytes = static_cast<uint64_t>(component_bytes(sparse.index_type));
   check_extent(d, {sparse.index_view, sparse.index_offset, sparse.count, index_bytes},
                where + ": its sparse indices");

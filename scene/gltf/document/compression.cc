@@ -346,8 +346,10 @@ void check_compressed(const Document& d, const BufferView& view, const std::stri
     refuse(d.path, what + " ends past the " + std::to_string(source.byte_length) +
                        " bytes of buffer " + std::to_string(from.buffer));
   if (source.kind == BufferSource::Kind::kNone)
-    refuse(d.path, what + ": buffer " + std::to_string(from.buffer) +
-                       " has no uri and is not in the file, expected one of the two");
+    refuse(
+        d.path,
+        what + ": buffer " + std::to_string(from.buffer) +
+            " has no uri and is not in the file, expected a uri, or a GLB file with the chunk BIN");
   if (!(buffer.meshopt ? kHasMeshopt : kHasDraco))
     refuse(d.path, where + " is compressed by " + name +
                        ", which this voxdag was built without: decompress the file (gltf-transform "

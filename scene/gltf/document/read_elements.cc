@@ -141,7 +141,8 @@ Transform read_transform(const JsonElement& node, const std::string& where, Docu
                      numbers_or<4>(rotation, {0, 0, 0, 1}, where, "rotation"),
                      numbers_or<3>(scale, {1, 1, 1}, where, "scale"));
   }
-  if (!is_finite(local)) throw Violation{where + ": its transform is not finite"};
+  if (!is_finite(local))
+    throw Violation{where + ": its transform is not finite, expected finite numbers"};
   if (rotation.size() == 4 && !is_unit(rotation))
     document.warn("unnormalized-rotation", where,
                   "its rotation is not a unit quaternion, and is used unchanged");

@@ -121,7 +121,8 @@ void correct_primitive(Document& d, const Primitive& primitive, BufferReader& bu
   std::optional<DracoPart> corrected = try_correct(*part, buffers, checked_faces);
   if (corrected && (corrected->corners != part->corners || corrected->vertices != part->vertices)) {
     d.warn("draco-counts", part->where,
-           "the counts of its accessors differ from its Draco data, which are read");
+           "its accessors have other numbers of vertices or faces than its Draco data; the numbers "
+           "of the Draco data are used");
     replace_part(d, primitive, *buffer, std::move(*corrected));
   }
   check_vertex_counts(d, primitive, part->where);

@@ -39,7 +39,8 @@ void refuse_other_format(const ReadableFile& file) {
   const std::string_view text = file.size() == begin.size() ? without_end_marks(begin) : begin;
   if (!is_no_text(text)) return;
   const std::string known = describe_other_format(begin);
-  refuse(file.path(), known.empty() ? "is not a text, expected a library of materials" : known);
+  refuse(file.path(),
+         known.empty() ? "is not a text file, expected a library of materials" : known);
 }
 
 class LibraryList {

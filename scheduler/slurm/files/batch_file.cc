@@ -201,9 +201,10 @@ uint64_t BatchFile::copy_triangles(uint64_t offset, uint64_t count, TriangleStor
     uint64_t checksum = 0;
     std::memcpy(&checksum, chunk.data(), sizeof checksum);
     if (checksum64(records) != checksum)
-      throw Error(ErrorCode::kCorrupt,
-                  file_->path() + " at offset " + std::to_string(offset) +
-                      ": triangles fail their checksum: expected what was written there");
+      throw Error(
+          ErrorCode::kCorrupt,
+          file_->path() + " at offset " + std::to_string(offset) +
+              ": triangles fail their checksum: expected the triangles that were written there");
     add_records(store, bin, records);
     offset += chunk.size();
     left -= n;

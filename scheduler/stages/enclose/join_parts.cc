@@ -203,9 +203,11 @@ class PartJoiner {
   void check_label(uint32_t leaf, uint32_t label) const {
     const uint32_t part = tree_.leaves()[leaf].part;
     if (label < (part == PartTree::kEmpty ? 1 : parts_[part].touch.size())) return;
-    throw Error(ErrorCode::kCorrupt,
-                "the labels of a subvolume's face are damaged: expected the "
-                "number of a component");
+    throw Error(
+        ErrorCode::kCorrupt,
+        "the stored labels of the empty space at a face of a subvolume are damaged: label " +
+            std::to_string(label) +
+            " is not the number of a component of the subvolume, expected one");
   }
 
   // The face quadtree that was read last. It is kept because a large cube has many small neighbors

@@ -213,7 +213,7 @@ void check_disk(const char* what, const EstimateRange& bytes, const std::string&
   };
   const double free_bytes = static_cast<double>(free);
   const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
-                           " to " + gigabytes(bytes.high) + " of disk at its peak, " + folder +
+                           " to " + gigabytes(bytes.high) + " of disk at its peak, but " + folder +
                            " has " + gigabytes(free_bytes) + " free";
   if (bytes.low > free_bytes) throw DoesNotFit(need + ": expected more free space");
   if (bytes.high > free_bytes) progress.warn(need);

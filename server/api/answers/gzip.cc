@@ -42,7 +42,8 @@ bool accepts_gzip(std::string_view accepted) {
 std::string gzip(std::string_view bytes) {
   z_stream stream{};
   if (deflateInit2(&stream, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK)
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: zlib cannot compress an answer");
+    throw Error(ErrorCode::kOutOfMemory,
+                "out of memory: zlib cannot compress an answer: expected more free memory");
   std::string out(deflateBound(&stream, bytes.size()), '\0');
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
   stream.avail_in = static_cast<uInt>(bytes.size());

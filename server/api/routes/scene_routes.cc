@@ -103,7 +103,9 @@ Part part_of(const Request& request) {
     return part;
   }
   if (const auto whole = total_of_empty_part(header)) {
-    if (request.has_body) throw bad_request("Content-Range: bytes */TOTAL requires an empty body");
+    if (request.has_body)
+      throw bad_request(
+          "the request with Content-Range: bytes */TOTAL has a body: expected an empty body");
     return {*whole, whole, whole};
   }
   ByteRange range;

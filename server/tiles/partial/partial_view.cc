@@ -122,10 +122,10 @@ Answer PartialView::read(const JobFolder& folder, Answer (PublishedAnswers::*ans
 void PartialView::refresh(const std::string& work_folder) {
   if (!limiter_.may_read()) {
     if (has_failed_)
-      throw Error(
-          ErrorCode::kInvalidInput,
-          work_folder +
-              ": the last read failed, and the next one is not due yet: expected a request later");
+      throw Error(ErrorCode::kInvalidInput,
+                  work_folder +
+                      ": reading the finished subvolumes has just failed, and the service waits "
+                      "before it tries again: expected a later request");
     return;
   }
   const ReadLimiter::Charge charge(limiter_);

@@ -227,7 +227,7 @@ TEST_F(LevelSetTest, ExportsReportTheirVoxelsAndProgress) {
       return error_of([&] { exported(format.name, options, none, memory_bytes); }).message();
     };
     EXPECT_EQ(message({.grid = "mask", .band = 2}, 64 << 20),
-              "--band: expected --grid sdf as well");
+              "--band is given without --grid sdf: expected both");
     EXPECT_EQ(message({.grid = "sdf", .band = 17}, 64 << 20), "--band 17: expected 1 to 16");
     EXPECT_NE(message({.grid = "sdf"}, 300 << 10).find("the grid would take over"),
               std::string::npos);

@@ -249,7 +249,7 @@ TEST_F(Package, RefusesChangedIndexes) {
     return check_error("p");
   };
   EXPECT_THAT(replaced("\"tile_levels\":2", "\"tile_levels\":\"2\""),
-              testing::HasSubstr("'tile_levels' of the manifest: expected 2"));
+              testing::HasSubstr("'tile_levels' of the manifest is not valid: expected 2"));
   EXPECT_THAT(replaced("\"tile_levels\":2", "\"a\":" + std::string(100000, '[')),
               testing::HasSubstr("expected"));
   const std::string deep = std::string(50000, '[') + std::string(50000, ']');

@@ -147,8 +147,8 @@ TEST_F(OrderDefects, SwappedBricksAreNamed) {
   for_each_pointer([](uint32_t& pointer) {
     if (pointer <= 2) pointer = 2 - pointer;
   });
-  EXPECT_NE(verified().find("level 3, word 1: a child at word 2 before any parent of the node at "
-                            "word 0: expected the order by first parent"),
+  EXPECT_NE(verified().find("level 3, word 1: the pointer leads to word 2, but no pointer before "
+                            "it leads to the node at word 0: expected the order by first parent"),
             std::string::npos)
       << verified();
 }

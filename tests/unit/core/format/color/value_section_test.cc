@@ -222,9 +222,9 @@ TEST_F(ValueSectionTest, SectionsThatDoNotFitAreRefused) {
     write_bytes(changed, bad);
     return error_of([&] { verify(changed); }).message();
   };
-  EXPECT_THAT(refusal(1152 + 40, uint32_t{64}), HasSubstr("expected blocks"));
-  EXPECT_THAT(refusal(1152 + 128 + 40, uint32_t{16}), HasSubstr("expected blocks"));
-  EXPECT_THAT(refusal(1152 + 128 + 40, uint32_t{96}), HasSubstr("expected blocks"));
+  EXPECT_THAT(refusal(1152 + 40, uint32_t{64}), HasSubstr("its blocks do not have the size"));
+  EXPECT_THAT(refusal(1152 + 128 + 40, uint32_t{16}), HasSubstr("its blocks do not have the size"));
+  EXPECT_THAT(refusal(1152 + 128 + 40, uint32_t{96}), HasSubstr("its blocks do not have the size"));
   EXPECT_THAT(refusal(1152 + 128 + 40, uint32_t{64}), HasSubstr("header: "));
   EXPECT_THAT(refusal(1152 + 64 + 24, uint64_t{1}), HasSubstr("1 normals, the section has"));
   EXPECT_THAT(refusal(1152 + 128 + 32, uint64_t{1}), HasSubstr("materials, the section has"));
