@@ -232,8 +232,7 @@ class ClusterTest(unittest.TestCase):
         time.sleep(8)
         self.cluster.start_controller()
         self.finish(build, 16384)
-        # The nodes remember ids of tasks that the new controller may not know. Without a restart of
-        # the nodes, the controller could assign these ids again.
+        # The restart keeps the new controller from assigning ids that the nodes still use.
         self.cluster.restart_nodes()
 
     def test_a_node_that_cannot_start_tasks(self):
@@ -289,8 +288,7 @@ class ClusterTest(unittest.TestCase):
         return {state: states.count(state) for state in set(states)}
 
     def wait_for_tasks(self, name, expected):
-        """Waits until the tasks have these states: Slurm can notice their end after the build
-        does."""
+        """Waits until Slurm reports these states. It can notice an end after the build does."""
         self.wait_for(lambda: self.submitted(name) == expected,
                       lambda: f"{expected} of {self.submitted(name)}", 15)
 
