@@ -1,8 +1,7 @@
-// Presents meshes in memory as scene files. MeshFiles is a file system with an additional path for
-// each mesh, under which it provides the mesh as a PLY file, and with a path for each texture and
-// each scene file in memory. All other paths refer to the underlying file system. The build reads
-// the PLY files in parts, like every scene file. Each read generates the requested bytes from the
-// mesh.
+// Presents meshes in memory as scene files. MeshFiles is a file system that adds paths to another
+// file system: one for each mesh, for each texture and for each scene file in memory. All other
+// paths refer to the underlying file system. A mesh has the form of a PLY file. The build reads
+// this file in parts, like every scene file. Each read generates the requested bytes from the mesh.
 #pragma once
 
 #include <map>

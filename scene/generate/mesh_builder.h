@@ -32,7 +32,7 @@ inline Float3 rounded(const Vec3& v) {
 struct Turn {
   double cosine = 1, sine = 0;
 };
-// Returns rotation `choice` modulo 12 of a fixed list.
+// Returns a rotation from a fixed list of 12. Its index in the list is `choice` modulo 12.
 Turn pythagorean_turn(uint32_t choice);
 
 struct MeshBuilder {

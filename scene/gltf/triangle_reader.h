@@ -49,7 +49,7 @@ class TriangleReader {
   static constexpr size_t kBatchTriangles = 1024;
   static constexpr uint64_t kWindowTriangles = 4096;
 
-  // All instances of a primitive drawn by a node.
+  // A primitive that a node draws, with all instances of the node.
   struct Draw {
     uint64_t first = 0, end = 0;  // the triangles [first, end) of the document
     int node = -1;

@@ -83,7 +83,7 @@ double AssimpScene::meters_per_unit() const {
   return as_double > 0 && as_double < HUGE_VAL ? as_double / 100 : 1;
 }
 
-// Returns the axes of an FBX file that point right, up and to the front. Returns 0, 1 and 2 for
+// Returns the axes of an FBX file that point right, up and to the front. Returns x, y and z for
 // other files, for files without valid metadata of their axes, and if assimp has already rotated
 // the scene (its root node then has a transformation).
 std::array<AssimpScene::Axis, 3> AssimpScene::axes() const {

@@ -41,7 +41,7 @@ class GlbExport {
   WarningList& warnings_;
   MaterialExport materials_;
   std::vector<MeshExport> meshes_;
-  std::vector<nlohmann::json> primitives_;  // by assimp mesh; null for a mesh without triangles
+  std::vector<nlohmann::json> primitives_;  // one per assimp mesh; null if it has no triangles
   // The meshes of the .glb, keyed by the assimp meshes that they consist of.
   std::map<std::vector<unsigned>, size_t> mesh_numbers_;
   nlohmann::json glb_meshes_ = nlohmann::json::array();

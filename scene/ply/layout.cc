@@ -94,7 +94,8 @@ class LayoutFinder {
  private:
   const Element& element(size_t index) const { return header_.elements[index]; }
 
-  // Returns kNone for an element without rows.
+  // Returns the index of the element with this name. Returns kNone if the file has no such element,
+  // or if the element has no rows.
   size_t find_rows(const char* name) const {
     const size_t index = find_element(header_, name);
     return index == kNone || element(index).count == 0 ? kNone : index;

@@ -189,8 +189,8 @@ size_t take_line_of_numbers(std::string_view& text) {
   return count;
 }
 
-// Describes a file of the format PTS, which begins with the number of its points, or PTX, which
-// begins with the size of a grid of points. Returns "" for other texts.
+// Describes a file of the format PTS or PTX. A PTS file begins with the number of its points, and a
+// PTX file begins with the size of a grid of points. Returns "" for other texts.
 std::string describe_points(std::string_view text) {
   if (take_line_of_numbers(text) != 1) return "";
   size_t numbers = take_line_of_numbers(text);

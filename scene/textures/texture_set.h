@@ -82,8 +82,9 @@ uint64_t pyramid_bytes(FileSystem& files, const SceneMaterials& materials, Memor
                        const CancelToken& cancel);
 
 // Returns the SHA-256 of each image's stored bytes, as lower-case hex digits. For an image that
-// cannot be read to its end, or whose format has no decoder here, returns a text that is never such
-// a digest. Reads all images, but decodes none. Throws the same errors as TextureSet::prepare().
+// cannot be read to its end, or whose format this build cannot decode, returns a text that is never
+// such a digest. Reads all images, but decodes none. Throws the same errors as
+// TextureSet::prepare().
 std::vector<std::string> image_digests(FileSystem& files, std::span<const ImageSource> images,
                                        unsigned threads, const CancelToken& cancel);
 

@@ -33,8 +33,8 @@ TEST_P(ColorCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(ColorCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// After a fault during keep_only(), either all unwanted artifacts are removed or none. The wanted
-// artifact remains.
+// If a fault interrupts ColorStore::keep_only(), either all unwanted artifacts are removed or none
+// is removed. The wanted artifact remains.
 TEST(ColorStoreCrash, KeepsWhatIsWanted) {
   const voxdag::TemporaryFolder folder;
   const std::string path = folder.file("colors.vddurable");

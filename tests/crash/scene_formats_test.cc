@@ -1,5 +1,5 @@
-// The triangles of a glTF scene are stored in another format. The build gives the same bytes, even
-// if it is killed during ingest and then resumed.
+// The tests store the triangles of a glTF scene in other formats. The build gives the same bytes,
+// even if it is killed during ingest and then resumed.
 #include <cstring>
 #include <iomanip>
 #include <sstream>

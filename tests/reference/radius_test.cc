@@ -57,7 +57,8 @@ TEST_F(Radius, EqualsTheOracle) {
       expect_sealed(kind, edge, radius);
 }
 
-// With these radii, the smallest cubes that cube_walk.h processes have 4, 8 and 16 voxels per edge.
+// With these radii, the smallest cubes that core/dag/space/cube_walk.h processes have 4, 8 and 16
+// voxels per edge.
 TEST_F(Radius, LargeRadius) {
   for (const int radius : {3, 5, 16}) expect_sealed(oracle::SolidKind::kHoles, 32, radius);
 }
@@ -82,7 +83,8 @@ TEST_F(Radius, RunOptionsNeverShow) {
   }
 }
 
-// A subvolume whose positions exceed the memory of one of several threads is processed as octants.
+// If the positions of the walking cube in a subvolume do not fit in a thread's share of the memory,
+// the build processes the octants of the subvolume one by one. The bytes are the same.
 TEST_F(Radius, OctantsNeverShow) {
   BuildSpec spec =
       sealed(oracle::make_scene(oracle::SceneKind::kSpanning, 3, {{0, 0, 0}, 256}, 100), 256, 1);

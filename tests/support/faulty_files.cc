@@ -176,8 +176,8 @@ void FaultyFiles::sync_directory(const std::string& path) {
 }
 
 void FaultyFiles::cut_power() {
-  // Holds the lock until the process ends, so that no other thread can report bytes as durable that
-  // are dropped here.
+  // Holds the lock until the process ends. Otherwise, another thread could report bytes as durable
+  // after they have been dropped here.
   std::lock_guard lock(mutex_);
   for (const auto& [path, bytes] : synced_)
     std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;

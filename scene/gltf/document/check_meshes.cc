@@ -99,7 +99,8 @@ void check_triangles(Document& d, Primitive& primitive, const std::string& where
     warn_of_quantization(d, target, where + ": POSITION of a morph target");
   }
   check_joint_sets(d, primitive, where);
-  // Draco data can have other counts than the accessors; correct_draco_counts() checks them.
+  // The counts in Draco data can differ from the accessors' counts. correct_draco_counts() checks
+  // them later.
   if (!decoded_buffer(d, primitive)) check_vertex_counts(d, primitive, where);
   warn_of_leftovers(d, primitive, where);
 }

@@ -14,8 +14,8 @@
 namespace voxdag::gltf {
 namespace {
 
-// Refuses required extensions that may change the geometry, except ignored ones, and warns of all
-// extensions that are not read.
+// Refuses required extensions that may change the geometry, unless `ignored` names them. Warns of
+// all extensions that are not read.
 void check_extensions(Document& d, const std::vector<std::string>& ignored) {
   const auto warn = [&](const char* code, const std::string& message) {
     d.warn(code, "", message);

@@ -104,7 +104,7 @@ Container read_glb(const ReadableFile& file) {
     refuse(file.path(),
            "the first chunk of the GLB is not JSON, expected the chunk type 0x4E4F534A");
   Container container{json.content, false, {}};
-  // Chunks of other types may come before BIN. The padding after the last one may be incomplete.
+  // Chunks of other types may come before BIN. The padding after the last chunk may be incomplete.
   uint64_t next = next_chunk(file, json.content.begin + json.content.size, end);
   while (!container.has_bin && next < end && !is_padding(file, next, end)) {
     const Chunk chunk = read_chunk(file, next, end);

@@ -5,7 +5,7 @@
 
 namespace voxdag::gltf {
 
-// Bytes [begin, begin + size).
+// Bytes [begin, begin + size) of the scene file.
 struct FileRange {
   uint64_t begin = 0;
   uint64_t size = 0;

@@ -81,7 +81,8 @@ class SectionParser : public nlohmann::json_sax<Json> {
   }
 
  private:
-  // Position of the next value.
+  // Kind of the next value: part of a skipped value, the root, the array of a section, an element
+  // of a section, or a value inside an element.
   enum class Place { kSkipped, kRoot, kSection, kElement, kInElement };
 
   Place next_place() {

@@ -24,7 +24,8 @@ bool is_plain(char c) { return c >= ' ' && c <= '~'; }
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-// Spellings of NaN and infinity after an optional sign, in lower case. Longer ones come first.
+// Spellings of NaN and infinity after an optional sign, in lower case. Longer spellings come first,
+// because only the first spelling that matches is used.
 constexpr std::string_view kNonFinite[] = {"nan(snan)", "nan(ind)", "nan",    "infinity", "inf",
                                            "1.#qnan",   "1.#snan",  "1.#ind", "1.#inf"};
 constexpr std::string_view kEndsOfWords = ",]} \t\r\n";

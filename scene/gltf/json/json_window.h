@@ -32,7 +32,7 @@ class JsonWindow : public std::streambuf {
 
   // Returns the position in the file of the character that the parser receives next.
   uint64_t position() const { return position_; }
-  // Returns the last complete string.
+  // Returns the position of the last complete string in the file.
   const RawString& last_string() const { return string_; }
 
  private:

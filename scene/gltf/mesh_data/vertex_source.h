@@ -50,7 +50,7 @@ class VertexSource : public PositionSource {
     AccessorReader joints;
     AccessorReader weights;
   };
-  // The joints of one vertex.
+  // The blended joint matrices of one vertex.
   struct Blend {
     Transform sum = {{{0, 0, 0, 0}, {0, 0, 0, 0}, {0, 0, 0, 0}}};  // weighted sum of the matrices
     double weights = 0;                                            // sum of the weights

@@ -1,5 +1,5 @@
-// data: URIs (RFC 2397), base64 or percent-encoded, also in the forms that other programs write
-// although the RFC does not allow them.
+// data: URIs (RFC 2397), base64 or percent-encoded, also in forms that some programs write although
+// the RFC does not allow them.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Percent-encoding (RFC 3986) as other programs write it.
+// Percent-encoding (RFC 3986), also in the invalid form that some programs write.
 #pragma once
 
 #include <string>

@@ -37,7 +37,7 @@ struct IgnoredStatements {
 
 }  // namespace
 
-// The pass over the file.
+// The first pass over the file, which collects the members of ObjFile.
 class ObjFile::Scan {
  public:
   Scan(ObjFile& obj, MemoryBudget& budget, const CancelToken& cancel)

@@ -15,7 +15,7 @@ constexpr std::pair<std::string_view, Kind> kKeywords[] = {
     {"p", Kind::kPointOrLine},
     {"l", Kind::kPointOrLine},
     {"call", Kind::kCall},
-    // Names and display.
+    // Names, normals and properties for display, which do not affect voxels.
     {"vn", Kind::kIgnored},
     {"vp", Kind::kIgnored},  // only free-form statements use these points
     {"o", Kind::kIgnored},

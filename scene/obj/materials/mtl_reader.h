@@ -20,7 +20,7 @@ struct ImageMap {
   std::string file;  // as in the statement; "": none
   // Texture coordinates (u, v) become scale * (u, v) + offset.
   std::array<double, 2> scale{1, 1}, offset{0, 0};
-  bool is_clamped = false;  // clamped to the edge, instead of repeated
+  bool is_clamped = false;  // true: coordinates are clamped to the edge, not repeated
 };
 
 struct LibraryMaterial {

@@ -204,7 +204,7 @@ void DeviceMemory::kernel_write(void* p, uint64_t bytes, uint32_t first, uint32_
 }
 
 void DeviceMemory::forget_writers() {
-  madvise(writer_, kBytes * sizeof(uint32_t), MADV_DONTNEED);  // zeros from now on
+  madvise(writer_, kBytes * sizeof(uint32_t), MADV_DONTNEED);  // the pages then contain zeros
 }
 
 void DeviceMemory::kernel_atomic(void* p, uint64_t bytes, uint32_t first) {

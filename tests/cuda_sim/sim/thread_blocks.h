@@ -32,7 +32,7 @@ struct RunningThread {
 };
 extern thread_local RunningThread g_running;
 
-// The stacks of all fibers.
+// True if `p` is in the stack of a fiber.
 bool on_fiber_stack(const void* p);
 
 void block_barrier();

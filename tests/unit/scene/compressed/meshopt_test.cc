@@ -29,7 +29,8 @@ std::vector<unsigned char> encode_sequence(const std::vector<uint32_t>& indices)
 }
 
 // Returns the indices after encoding and decoding them. The codec may rotate the corners of
-// triangles, so a scene with uncompressed indices must store the decoded ones to be equal.
+// triangles, so a scene with uncompressed indices has equal triangles only if it stores the decoded
+// indices.
 std::vector<uint32_t> turned(const std::vector<uint32_t>& indices) {
   const auto bytes = encode_triangles(indices);
   std::vector<uint32_t> out(indices.size());
