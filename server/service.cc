@@ -94,6 +94,7 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
   steps_.run("remove the folders of old plans", [this] { remove_plans(files_, config_); });
   add_job_routes(router_);
   add_result_routes(router_);
+  add_export_routes(router_);
   add_job_tile_routes(router_);
   add_event_routes(router_);
   add_scene_routes(router_);

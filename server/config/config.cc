@@ -44,6 +44,12 @@ void fields(Visitor& visit, JobLimits& jobs) {
 }
 
 template <class Visitor>
+void fields(Visitor& visit, ExportLimits& exports) {
+  visit(Field("memory").bytes(), exports.memory_bytes);
+  visit("max_per_job", exports.max_per_job);
+}
+
+template <class Visitor>
 void fields(Visitor& visit, TransferLimits& transfers) {
   visit(Field("max_scene_size").bytes(), transfers.max_scene_bytes);
   visit(Field("max_body_size").bytes(), transfers.max_body_bytes);
@@ -77,6 +83,7 @@ void fields(Visitor& visit, ServerConfig& c) {
     tls("key_file", c.http.key_file);
   });
   visit("jobs", c.jobs);
+  visit("exports", c.exports);
   // The cluster options of a service differ from the options of `build`: their names have no
   // prefix, and there is an option for the path of the program.
   visit.object("cluster", [&](auto& cluster) {
@@ -143,6 +150,9 @@ void check_config(const ServerConfig& config) {
          "jobs.memory is " + size_text(config.jobs.memory_bytes) +
              ": expected at least 64MiB for each of the " +
              std::to_string(config.jobs.max_concurrent) + " jobs of jobs.max_concurrent");
+  expect(
+      config.exports.memory_bytes == 0 || config.exports.memory_bytes >= kMinMemory,
+      "exports.memory is " + size_text(config.exports.memory_bytes) + ": expected at least 64MiB");
   expect(config.jobs.cache_bytes == 0 || config.cluster.engine == ClusterEngine::kNone,
          "jobs.cache is " + size_text(config.jobs.cache_bytes) +
              ": expected no cache with cluster.engine, because builds of a cluster do not use it");

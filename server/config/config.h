@@ -30,6 +30,11 @@ struct JobLimits {
   unsigned max_concurrent_plans = 1;
 };
 
+struct ExportLimits {
+  uint64_t memory_bytes = 0;  // per export; 0: a quarter of the machine's memory
+  size_t max_per_job = 16;
+};
+
 struct TransferLimits {
   uint64_t max_scene_bytes = uint64_t{64} << 30;
   uint64_t max_body_bytes = 64 << 10;  // JSON bodies
@@ -63,6 +68,7 @@ struct ServerConfig {
   // was installed under the same name since.
   std::string program = "/proc/self/exe";
   JobLimits jobs;
+  ExportLimits exports;
   // The cluster that builds the subvolumes of jobs. If its engine is kNone, jobs use this machine.
   ClusterOptions cluster;
   TransferLimits transfers;

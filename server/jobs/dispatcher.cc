@@ -10,6 +10,7 @@
 #include "scheduler/cluster/cluster.h"
 #include "server/jobs/job_outcome.h"
 #include "server/jobs/protocol/job_task.h"
+#include "server/jobs/run_child.h"
 
 namespace voxdag::server {
 namespace {
@@ -59,6 +60,8 @@ Dispatcher::Dispatcher(const ServerConfig& config, FileSystem& files, JobQueue& 
   if (config_.adopt) folders_.adopt();
   recovered_ = steps_.run("recover the jobs", [this] { recover(); });
   steps_.run("clean up the folders of jobs", [this] { folders_.clean_up(); });
+  exports_ = std::make_unique<Exports>(config_, files_, queue_, config_.data_folder + "/jobs",
+                                       steps_, log_);
   thread_ = std::thread([this] {
     while (!steps_.run("dispatch jobs", [this] { dispatch(); }) && !stopping()) sleep_s(kMaxSleepS);
   });
@@ -88,10 +91,12 @@ void Dispatcher::stop() {
     stops_ = true;
     for (auto& [key, worker] : workers_) worker.live->stop();
   }
+  exports_->begin_stop();
   queue_.announce();
   if (thread_.joinable()) thread_.join();
   for (auto& [key, worker] : workers_)
     if (worker.thread.joinable()) worker.thread.join();
+  exports_->stop();
 }
 
 void Dispatcher::dispatch() {
@@ -223,25 +228,9 @@ void Dispatcher::start_worker(const std::string& key, std::shared_ptr<LiveJob> l
   }
 }
 
-ChildProcess::End Dispatcher::run_child(const ChildProcess::Start& start, LiveJob& live,
-                                        double max_s) {
-  ChildProcess child(start);
-  bool stop_sent = false;
-  const double started_s = wall_seconds();
-  child.read_lines(
-      [&](std::string_view line) {
-        const auto message = decode(line);
-        if (!message) return;
-        live.apply(*message);
-        queue_.announce();
-      },
-      [&] {
-        const double stop_s = live.stop_requested_s(), now = wall_seconds();
-        if (stop_s > 0 && !stop_sent) child.request_stop();
-        stop_sent = stop_s > 0;
-        return (stop_sent && now > stop_s + config_.jobs.stop_timeout_s) || now > started_s + max_s;
-      });
-  return child.wait();
+ChildProcess::End Dispatcher::run_process(const ChildProcess::Start& start, LiveJob& live,
+                                          double max_s) {
+  return run_child(start, live, config_.jobs.stop_timeout_s, max_s, [this] { queue_.announce(); });
 }
 
 void Dispatcher::run_job(const Job& job, LiveJob& live) {
@@ -251,8 +240,8 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
     files_.make_directories(place.path);
     write_task(files_, place.task(),
                tasks_.make(parse_job_request(job.request), JobTask::Kind::kBuild));
-    end = run_child({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
-                    live, kNoTimeLimitS);
+    end = run_process({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
+                      live, kNoTimeLimitS);
   } catch (const std::exception& error) {
     log_("job " + job.id + ": " + error.what());
     const PublicError seen = public_error(error);
@@ -289,11 +278,11 @@ void Dispatcher::draw_preview(const Job& job, LiveJob& live) {
   bool drawn = false;
   steps_.run("draw a preview", [&] {
     const ChildProcess::End end =
-        run_child({{config_.program, "render", place.result(), "-o", place.preview(), "--size",
-                    "960x540", "--samples", "1", "--threads", "1"},
-                   place.file("preview.log"),
-                   config_.jobs.nice + kPreviewNice},
-                  live, kMaxPreviewS);
+        run_process({{config_.program, "render", place.result(), "-o", place.preview(), "--size",
+                      "960x540", "--samples", "1", "--threads", "1"},
+                     place.file("preview.log"),
+                     config_.jobs.nice + kPreviewNice},
+                    live, kMaxPreviewS);
     drawn = end.signal == 0 && end.exit_status == 0 && files_.exists(place.preview());
   });
   if (live.stop_requested_s() > 0) return;
@@ -416,11 +405,13 @@ void Dispatcher::remove(const std::string& id) {
   queue_.check_removable(id);
   stop_tasks(id);
   const FilesLock files_lock(*this, id);
+  Exports::Pause exports(*exports_, id);
   {
     std::lock_guard lock(mutex_);  // so that the job is not retried between check and mark
     queue_.check_removable(id);
     folders_.mark(id);
   }
+  exports.forget();
   try {
     folders_.remove_marked(id);
   } catch (...) {

@@ -25,6 +25,7 @@
 #include "server/base/steps.h"
 #include "server/config/config.h"
 #include "server/disk/disk_space.h"
+#include "server/jobs/exports.h"
 #include "server/jobs/job_folders.h"
 #include "server/jobs/live_job.h"
 #include "server/jobs/process/child_process.h"
@@ -66,6 +67,8 @@ class Dispatcher {
   // `failed_attempts` and `running`.
   ClusterTasks cluster_tasks() const;
   JobFolder folder(const std::string& id) const;
+  // The exports of the jobs' results.
+  Exports& exports() { return *exports_; }
 
  private:
   struct Worker {
@@ -116,10 +119,8 @@ class Dispatcher {
   void run_job(const Job& job, LiveJob& live);
   void record_outcome(const Job& job, LiveJob& live, const ChildProcess::End& end);
   void draw_preview(const Job& job, LiveJob& live);
-  // Runs a process to its end. If `live` gets a stop request, requests the process to stop, and
-  // kills the process JobLimits::stop_timeout_s later. Also kills it after it has run for `max_s`
-  // seconds.
-  ChildProcess::End run_child(const ChildProcess::Start& start, LiveJob& live, double max_s);
+  // Runs a process to its end (run_child.h).
+  ChildProcess::End run_process(const ChildProcess::Start& start, LiveJob& live, double max_s);
 
   const ServerConfig& config_;
   FileSystem& files_;
@@ -147,6 +148,8 @@ class Dispatcher {
   // wait for changes of the queue.
   mutable std::mutex live_mutex_;
   std::map<std::string, std::shared_ptr<LiveJob>> live_;  // keyed by job
+
+  std::unique_ptr<Exports> exports_;
 
   // Used only by the thread that starts jobs.
   double next_retirement_s_ = 0;  // in wall_seconds()

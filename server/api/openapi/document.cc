@@ -17,6 +17,8 @@ namespace {
 std::vector<Parameter> path_parameters() {
   return {
       {"id", "id of the job, 16 hex digits", "^[0-9a-f]{16}$"},
+      {"export", "id of the export, 16 hex digits", "^[0-9a-f]{16}$"},
+      {"file", "index of the file in `files` of the export", "", IntegerRange{0, 15}},
       {"name", "name of the scene, ending with " + list_scene_endings(), scene_name_pattern()},
       {"level", "level of a node, 0 for the root", "", IntegerRange{0, 17}},
       {"offset", "offset of the node within its level, in words", "",
@@ -30,7 +32,7 @@ constexpr std::pair<int, const char*> kProblems[] = {
     {403, "the role is not sufficient, or the Host or Origin is wrong"},
     {404, "not found"},
     {408, "the request was sent too slowly"},
-    {409, "the job is in another state, or the scene is in use"},
+    {409, "the job or the export is in another state, or the scene is in use"},
     {410, "the file was replaced: its manifest has a new digest"},
     {413, "the body is too large"},
     {415, "the content type is not JSON, or the body is encoded"},

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "core/fields/json_schema.h"
+#include "server/jobs/protocol/export_record.h"
+#include "server/jobs/protocol/export_spec.h"
 #include "server/jobs/protocol/job_request.h"
 #include "server/queue/job.h"
 
@@ -93,6 +95,10 @@ void add_requests(Json& all) {
   request["examples"] = {{{"scene", "m.glb"}, {"resolution", 64}}};
   all["JobRequest"] = request;
   all["JobPatch"] = options_schema<JobPatch>();
+  Json exported = options_schema<ExportSpec>();
+  exported["properties"]["to"]["enum"] = export_spec_formats();
+  exported["examples"] = {{{"to", "npz"}, {"level", 6}}};
+  all["ExportRequest"] = exported;
 }
 
 void add_progress(Json& all) {
@@ -169,6 +175,28 @@ void add_jobs(Json& all) {
   all["JobList"] = object({{"jobs", array(named("Job"))},
                            {"next_cursor", or_null("string")},
                            {"counts", map_of(count())}});
+}
+
+void add_exports(Json& all) {
+  const std::vector<std::string> states = choices_of<ExportState>();
+  all["ExportedFile"] =
+      object({{"name", text()}, {"bytes", count()}, {"sha256", text()}, {"href", text()}});
+  Json error = object({{"code", text()}, {"message", text()}});
+  error["type"] = {"object", "null"};
+  all["Export"] = object({{"id", pattern("^[0-9a-f]{16}$")},
+                          {"job", pattern("^[0-9a-f]{16}$")},
+                          {"state", {{"type", "string"}, {"enum", states}}},
+                          {"request", type("object")},
+                          {"created_at", time()},
+                          {"started_at", time()},
+                          {"finished_at", time()},
+                          {"progress", named_or_null("Progress")},
+                          {"error", error},
+                          {"voxels", or_null("integer")},
+                          {"notes", array(text())},
+                          {"files", array(named("ExportedFile"))},
+                          {"links", map_of(text())}});
+  all["ExportList"] = object({{"exports", array(named("Export"))}});
 }
 
 void add_machine(Json& all) {
@@ -254,8 +282,8 @@ void add_subvolumes(Json& all) {
 
 Json make_schemas() {
   Json all;
-  for (const auto add : {add_common, add_scenes, add_requests, add_progress, add_jobs, add_machine,
-                         add_plan, add_manifests, add_subvolumes})
+  for (const auto add : {add_common, add_scenes, add_requests, add_progress, add_jobs, add_exports,
+                         add_machine, add_plan, add_manifests, add_subvolumes})
     add(all);
   return all;
 }

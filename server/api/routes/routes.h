@@ -7,6 +7,7 @@ namespace voxdag::server {
 
 void add_job_routes(Router& router);
 void add_result_routes(Router& router);
+void add_export_routes(Router& router);
 // Adds the routes for the tiles of finished results and of unfinished jobs.
 void add_job_tile_routes(Router& router);
 void add_event_routes(Router& router);

@@ -17,6 +17,7 @@
 #include "scheduler/state/work_folder.h"
 #include "server/base/request_error.h"
 #include "server/jobs/process/confined_files.h"
+#include "server/jobs/process/export_process.h"
 #include "server/jobs/process/progress_pipe.h"
 #include "server/jobs/protocol/job_request.h"
 #include "server/jobs/protocol/job_task.h"
@@ -120,6 +121,7 @@ std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progre
                     const CancelToken& cancel) {
   const JobTask task = read_task(files, folder.task());
   link_uploads(task);
+  if (task.kind == JobTask::Kind::kExport) return run_export(files, task, progress, cancel);
   ConfinedFiles readable = confined(files, task, folder);
   const BuildContext context{readable, progress, cancel};
   const BuildSpec spec = spec_of(task, folder);

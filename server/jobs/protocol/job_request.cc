@@ -1,34 +1,9 @@
 #include "server/jobs/protocol/job_request.h"
 
-#include "core/fields/json_fields.h"
 #include "server/base/json_text.h"
-#include "server/base/request_error.h"
+#include "server/jobs/protocol/request_body.h"
 
 namespace voxdag::server {
-namespace {
-
-// Parses the body of a request into `options`. Returns the body as JSON.
-template <class Options>
-FieldJson read_body(std::string_view body, Options& options) {
-  FieldJson json = FieldJson::parse(body, nullptr, false);
-  if (json.is_discarded())
-    throw RequestError(RequestError::Kind::kInvalid,
-                       "the body is not JSON: expected a JSON object");
-  set_options(json, "the body", options);
-  return json;
-}
-
-// Runs `parse`, and throws its errors as RequestError{kInvalid}.
-auto as_request(const auto& parse) {
-  try {
-    return parse();
-  } catch (const FieldError& error) {
-    throw RequestError(RequestError::Kind::kInvalid, error.message());
-  }
-}
-
-}  // namespace
-
 JobPatch parse_job_patch(std::string_view body) {
   return as_request([&] {
     JobPatch patch;

@@ -6,7 +6,9 @@
 
 namespace voxdag::server {
 
-constexpr std::array<const char*, 2> enum_names(JobTask::Kind) { return {"build", "plan"}; }
+constexpr std::array<const char*, 3> enum_names(JobTask::Kind) {
+  return {"build", "plan", "export"};
+}
 
 template <class Visitor>
 void fields(Visitor& visit, JobTask& task) {
@@ -28,6 +30,7 @@ void fields(Visitor& visit, JobTask& task) {
     cluster("max_retries", task.cluster.max_retries);
     cluster("grace_s", task.cluster.grace_s);
   });
+  visit(Field("output").omit_empty(), task.output);
 }
 
 void write_task(FileSystem& files, const std::string& path, const JobTask& task) {

@@ -12,9 +12,9 @@
 namespace voxdag::server {
 
 struct JobTask {
-  enum class Kind { kBuild, kPlan };
+  enum class Kind { kBuild, kPlan, kExport };
   Kind kind = Kind::kBuild;
-  std::string request;                         // the text of a JobRequest
+  std::string request;                         // text of a JobRequest; kExport: of an ExportSpec
   std::map<std::string, std::string> uploads;  // paths of the request's uploaded scenes, by name
   std::vector<std::string> readable;  // files, and folders ending in '/', that scenes may refer to
   uint64_t memory_bytes = 0;          // memory limit if the request has none
@@ -23,6 +23,7 @@ struct JobTask {
   std::string cache_folder;           // "": no cache
   uint64_t cache_bytes = 0;           // limit of the cache folder
   ClusterOptions cluster;             // as in ServerConfig
+  std::string output;                 // kExport: name of the (first) file to write
 };
 void write_task(FileSystem& files, const std::string& path, const JobTask& task);
 // Reads a task. Throws Error{kCorrupt} for a file that is not a task.

@@ -1,0 +1,28 @@
+// Downloads of large files, with ranges: results of jobs and exports.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/io/file_system.h"
+#include "server/api/context/context.h"
+#include "server/api/routing/route.h"
+
+namespace voxdag::server {
+
+// Returns the job with the id of the call. Throws Problem (404) unless it has succeeded.
+Job finished_job(Context& context, Call& call);
+// Returns the beginning of the file name of a download, NAME-RESOLUTION. NAME is the name of the
+// job, or of its first scene if the job has no name, reduced to characters that are safe in headers
+// and shells.
+std::string download_stem(const Job& job, uint64_t resolution);
+
+// Answers with a file, or with the ranges of it that the request selects. `name` is the file name
+// that the client sees. Throws Problem: 416 if no range is within the file, 503 if too many
+// downloads are in progress.
+Response download(Context& context, Call& call, std::shared_ptr<ReadableFile> file,
+                  const std::string& sha256, const std::string& name);
+// Returns the GET route with the headers, answers and problems of a download.
+Route download_route(Route route);
+
+}  // namespace voxdag::server

@@ -1,0 +1,140 @@
+#include "server/jobs/protocol/export_spec.h"
+
+#include <cmath>
+
+#include "core/base/error.h"
+#include "server/base/json_text.h"
+#include "server/jobs/protocol/request_body.h"
+
+namespace voxdag::server {
+namespace {
+
+constexpr double kMaxCell = 1 << 30;  // a region may extend beyond the grid
+
+RequestError invalid_export(const std::string& message) {
+  return {RequestError::Kind::kInvalid, message};
+}
+
+void refuse_given(const ExportSpec& spec,
+                  std::initializer_list<std::pair<const char*, bool>> options,
+                  const char* expectation) {
+  for (const auto& [name, is_given] : options)
+    if (is_given)
+      throw invalid_export("'" + std::string(name) + "': expected " + expectation + ", not " +
+                           spec.to);
+}
+
+// Returns the cells of the region, which may extend beyond the grid.
+query::Region cells_of(const std::array<double, 6>& box) {
+  query::Region region;
+  for (size_t axis = 0; axis < 3; ++axis) {
+    region.low[axis] = static_cast<int64_t>(box[axis]);
+    region.high[axis] = static_cast<int64_t>(box[axis + 3]);
+  }
+  return region;
+}
+
+void check_region(const ExportSpec& spec) {
+  if (!spec.region) {
+    if (spec.world) throw invalid_export("'world': expected a 'region' in scene units");
+    return;
+  }
+  const auto& box = *spec.region;
+  for (const double number : box)
+    if (!spec.world && (number != std::floor(number) || std::abs(number) > kMaxCell))
+      throw invalid_export(
+          "'region': expected six whole numbers X0,Y0,Z0,X1,Y1,Z1, or 'world' for a region in "
+          "scene units");
+  for (size_t axis = 0; axis < 3; ++axis)
+    if (!(box[axis] < box[axis + 3]))
+      throw invalid_export("'region': expected X0 < X1, Y0 < Y1 and Z0 < Z1");
+}
+
+}  // namespace
+
+std::vector<std::string> export_spec_formats() {
+  std::vector<std::string> names = {"vdag"};
+  for (const query::ExportFormat& format : query::export_formats()) names.emplace_back(format.name);
+  return names;
+}
+
+void check_export_spec(const ExportSpec& spec) {
+  check_region(spec);
+  if (spec.is_extract()) {
+    refuse_given(spec,
+                 {{"gray", spec.gray},
+                  {"up", spec.up != ExportSpec::Up::kOfFormat},
+                  {"grid", spec.grid != ExportSpec::Grid::kOfFormat},
+                  {"band", spec.band.has_value()},
+                  {"compact", spec.compact},
+                  {"outside", spec.outside},
+                  {"watertight", spec.watertight}},
+                 "a format of voxdag export");
+    return;
+  }
+  const query::ExportFormat* format = nullptr;
+  for (const query::ExportFormat& known : query::export_formats())
+    if (spec.to == known.name) format = &known;
+  if (!format)
+    throw invalid_export("'to' is '" + printable_line(spec.to) + "': expected one of " +
+                         joined(export_spec_formats()));
+  refuse_given(spec, {{"crop", spec.crop}, {"majority", spec.majority}}, "the format vdag");
+  try {
+    query::check_export_options(*format, export_options_of(spec));
+  } catch (const Error& error) {
+    throw invalid_export(error.message());
+  }
+}
+
+ExportSpec parse_export_spec(std::string_view body) {
+  ExportSpec spec = as_request([&] {
+    ExportSpec read;
+    read_body(body, read);
+    return read;
+  });
+  check_export_spec(spec);
+  return spec;
+}
+
+std::string export_spec_text(const ExportSpec& spec) { return json_text(options_json(spec)); }
+
+query::Selection selection_of(const ExportSpec& spec, const voxdag_reader::File& file) {
+  query::Selection selection;
+  selection.grid_levels = spec.level.value_or(file.grid_levels());
+  if (selection.grid_levels > file.grid_levels())
+    throw invalid_export("'level' is " + std::to_string(selection.grid_levels) +
+                         ": expected 2 to " + std::to_string(file.grid_levels()) +
+                         ", the level of the result");
+  selection.region = query::whole_grid(selection.grid_levels);
+  if (!spec.region) return selection;
+  selection.region = query::cut_to_grid(
+      spec.world ? query::world_to_region(file, selection.grid_levels, *spec.region)
+                 : cells_of(*spec.region),
+      selection.grid_levels);
+  if (selection.region.empty())
+    throw invalid_export("'region' is outside the grid of " +
+                         std::to_string(int64_t{1} << selection.grid_levels) +
+                         " voxels per edge: expected a region that overlaps the grid");
+  return selection;
+}
+
+query::ExportOptions export_options_of(const ExportSpec& spec) {
+  query::ExportOptions options;
+  options.up = spec.up == ExportSpec::Up::kY   ? query::UpAxis::kY
+               : spec.up == ExportSpec::Up::kZ ? query::UpAxis::kZ
+                                               : query::UpAxis::kOfFormat;
+  options.grid = name_of(spec.grid);
+  options.band = spec.band.value_or(0);
+  options.compact = spec.compact;
+  options.outside = spec.outside;
+  options.watertight = spec.watertight;
+  return options;
+}
+
+std::string export_file_name(const ExportSpec& spec, const std::string& stem) {
+  if (!spec.is_extract())
+    if (const char* suffix = query::export_format(spec.to).suffix) return stem + suffix;
+  return stem + "." + spec.to;
+}
+
+}  // namespace voxdag::server
