@@ -48,8 +48,9 @@ class BatchTable {
   // in bins[i] of the store `triangles`.
   void add(std::span<const StoredSubvolume> subvolumes, std::span<const BinId> bins,
            const TriangleStore& triangles);
-  // Replaces a batch by at most two batches of about equal weight. These contain the batch's
-  // subvolumes or, if it has only one, this subvolume's octants. Returns the new batches' numbers.
+  // Replaces a batch by at most two batches of about equal weight. The new batches contain the
+  // batch's subvolumes or, if the batch has only one subvolume, this subvolume's octants. Returns
+  // the new batches' numbers.
   std::vector<uint32_t> split(uint32_t batch);
   bool can_be_split(const OpenBatch& batch) const;
   // Records the subvolumes of a built batch in the job store and closes the batch. The batch's

@@ -22,7 +22,8 @@ namespace {
 
 // Pause between two searches for records.
 constexpr double kRecordPauseS = 0.5;
-// Pause between the first two queries to Slurm. It doubles up to ClusterOptions::slurm_interval_s.
+// Pause between the first two queries to Slurm. The pause doubles after each query, up to
+// ClusterOptions::slurm_interval_s.
 constexpr double kFirstQueryPauseS = 1;
 
 void sleep_seconds(double seconds) {
@@ -33,8 +34,8 @@ class SlurmBuilder : public ClusterBuilder {
  public:
   explicit SlurmBuilder(BuildJob& job) : job_(job), cluster_(job) {}
 
-  // Continues an earlier run. Its unfinished batches remain open. Completion records that its tasks
-  // wrote after the run ended are accepted.
+  // Continues an earlier run. The unfinished batches of that run remain open. Accepts completion
+  // records that its tasks wrote after it ended.
   void resume(const std::string& scene_digest) override;
   // Cuts the triangles of `planned` into batches. Then waits until all batches are built, unless a
   // merge job will wait for them. Throws Error with the reason of the last failure if a batch has

@@ -1,6 +1,6 @@
 // The visible texels of an image, one bit per texel, with coarser levels. A block of level k covers
-// 2^k x 2^k texels. It has a bit that is set if any of these texels is visible, and a bit that is
-// set if all are. Any number of threads may read a finished mask.
+// 2^k x 2^k texels. Each block has a bit that is set if any of its texels is visible, and a bit
+// that is set if all of them are visible. Any number of threads may read a finished mask.
 #pragma once
 
 #include <cstdint>

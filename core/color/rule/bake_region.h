@@ -40,8 +40,9 @@ namespace voxdag {
 template <class Textures>
 class RegionBaker {
  public:
-  // Upper bound of the memory that this object allocates. It excludes the sums of normals and
-  // materials, which exist if the constructor's `wanted` has them, and vectors that callers pass.
+  // Upper bound of the memory that this object allocates. The bound excludes the sums of normals
+  // and materials, which exist if the constructor's `wanted` has them, and vectors that callers
+  // pass.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
   // Maximum number of cells of a region that a triangle touches. Along the triangle's dominant
   // axis, the region has 64^2 columns of cells. The triangle's plane touches at most 4 cells of
@@ -92,9 +93,9 @@ class RegionBaker {
     return cells_.count() <= max_cells_;
   }
   // Like the other add(), but adds the triangles in parts. If normals or materials are wanted,
-  // calls charge(bytes) after each part. `bytes` is the memory that their sums have allocated so
-  // far; it grows by at most 16 MiB between two calls. If charge() returns false, add() stops and
-  // returns false.
+  // calls charge(bytes) after each part. `bytes` is the memory that the sums of normals and
+  // materials have allocated so far. It grows by at most 16 MiB between two calls. If charge()
+  // returns false, add() stops and returns false.
   template <class Charge>
   bool add(std::span<const FixedSurface> triangles, const Charge& charge) {
     constexpr size_t kTrianglesPerCharge = 16;

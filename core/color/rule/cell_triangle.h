@@ -91,10 +91,10 @@ struct CellTriangle {
   double slope[2];  // rise along axis 2 per unit of axes 0 and 1; only for estimates
   bool degenerate;
   double area;  // twice the area in square lattice units: the length of the normal
-  // The function of the triangle's plane is normal.x - normal.v, for a point x and any vertex v. It
-  // is 0 on the plane. plane_floor and plane_ceil are the function's value at the grid's origin,
-  // divided by the cell's edge E = 2^cell_bits and rounded down and up. column_floor and
-  // column_ceil are its value at the point of column (0, 0) with the coordinate 0 along axis 2,
+  // The function of the triangle's plane is normal.x - normal.v, for a point x and any vertex v.
+  // The function is 0 on the plane. plane_floor and plane_ceil are the function's value at the
+  // grid's origin, divided by the cell's edge E = 2^cell_bits and rounded down and up. column_floor
+  // and column_ceil are its value at the point of column (0, 0) with the coordinate 0 along axis 2,
   // divided by E/4 and rounded down and up. The comment at the top of this file defines column (0,
   // 0).
   Int plane_floor, plane_ceil, column_floor, column_ceil;

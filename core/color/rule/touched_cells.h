@@ -166,9 +166,9 @@ class TouchedCells {
   }
 
   // Returns the columns in which the triangle's plane is above the bottom of a cell. If `or_in` is
-  // set, also returns the columns in which the plane is exactly at the bottom; this requires plane
-  // values that were not rounded. `at_bottom`: the plane's value at the cell's first column and
-  // bottom, rounded down.
+  // set, also returns the columns in which the plane is exactly at the bottom. This requires that
+  // rounding has not changed the plane's values. `at_bottom`: the plane's value at the cell's first
+  // column and bottom, rounded down.
   VOXDAG_HD uint32_t columns_above(Int at_bottom, bool or_in) const {
     return negative_columns<Int>(wrapping_sum(at_bottom, Int{or_in ? -1 : 0}), t_.normal[0],
                                  t_.normal[1]);

@@ -1,6 +1,6 @@
 // Compares the checksum blocks of a global file with their checksums, each block when it is first
-// used. This is for readers that use a part of a file and cannot wait until the complete file is
-// verified (docs/format.md, "Checksum table").
+// used. The class is for readers that use a part of a file and cannot wait until the complete file
+// is verified (docs/format.md, "Checksum table").
 //
 // An intact block is not compared again, so disk errors after its first use go unnoticed. Needs one
 // bit of memory per 64 KiB of the file. Thread-safe.

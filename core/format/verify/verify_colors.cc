@@ -185,8 +185,8 @@ class ColorVerifier {
                "the last value");
   }
 
-  // Returns the value that a cell of a tier's finest level must have. It is computed from the
-  // regions of the finer tier in this cell.
+  // Returns the value that a cell of a tier's finest level must have. This value is computed from
+  // the regions of the finer tier in this cell.
   uint32_t value_from_below(const ColorTier& tier, uint64_t code) const {
     const ColorTier& below = section_.tier_of(tier.finest_level + 1);
     uint32_t children[8];

@@ -6,8 +6,8 @@
 //   shell -> find_blocked() -> blocked positions -> closed positions -> find_enclosed() -> solid
 //
 // Coordinates of positions can be as low as -V. So positions have their own grid of twice the
-// resolution, in which they are stored like voxels. Its octant with the largest coordinates is the
-// grid of the voxels.
+// resolution, in which they are stored like voxels. The octant of this grid with the largest
+// coordinates is the grid of the voxels.
 #pragma once
 
 #include <vector>

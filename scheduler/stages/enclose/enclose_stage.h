@@ -1,6 +1,6 @@
 // The stage `enclose` of `--solid enclosed`: fills the empty voxels that no walk through empty
-// voxels reaches from the border of the grid. It works on the artifacts of the shell (the voxels
-// that triangles touch), in three steps:
+// voxels reaches from the border of the grid. The stage works on the artifacts of the shell (the
+// voxels that triangles touch), in three steps:
 //
 //   label   each part of the grid, on any thread: the components of its empty space that have a
 //           voxel at its faces (core/dag/space/space_labels.h); the labels at the faces are stored

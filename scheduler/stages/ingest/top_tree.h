@@ -1,6 +1,7 @@
 // The dense top tree. For every cell of a coarse level it counts the triangles that touch the cell,
-// and sums the cell's share of their expected work. These counters decide which cubes of the grid
-// become subvolumes. Threads fill separate tallies, which are added to the tree one after another.
+// and sums the cell's shares of the expected work of these triangles. These counters decide which
+// cubes of the grid become subvolumes. Threads fill separate tallies, which are added to the tree
+// one after another.
 #pragma once
 
 #include <algorithm>

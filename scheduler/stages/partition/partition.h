@@ -87,8 +87,8 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
                      const AfterPartitionPiece& after_piece);
 
 // Returns one bin for each of `cubes`, in the same order, with the triangles that touch this cube.
-// This is the cube's own bin if the store has one, and otherwise a part that is filled from the bin
-// of the smallest enclosing cube. Each returned bin has one reference. Releases the other cube
+// The bin is the cube's own bin if the store has one, and otherwise a part that is filled from the
+// bin of the smallest enclosing cube. Each returned bin has one reference. Releases the other cube
 // bins. Throws DamagedTriangles for a cube without an enclosing cube bin.
 std::vector<BinId> assign_bins(TriangleStore& store, uint32_t grid_levels,
                                std::span<const Cube> cubes, size_t buffer_bytes,

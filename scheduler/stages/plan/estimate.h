@@ -7,8 +7,8 @@
 // flatter within smaller voxels, so the factor falls with each further doubling, at a rate measured
 // on real scenes. The range of an estimate widens with the number of doublings from the pilots.
 //
-// The pilots of a solid are solids. Its voxels and octree nodes grow as a R^3 + b R^2: a R^3 for
-// the volume of the interior, b R^2 for the area of surfaces.
+// The pilots of a solid are solids. The voxels and octree nodes of a solid grow as a R^3 + b R^2: a
+// R^3 for the volume of the interior, b R^2 for the area of surfaces.
 #pragma once
 
 #include <cstdint>

@@ -13,9 +13,9 @@ namespace voxdag {
 namespace {
 
 // Returns the number of grid levels of the finer of the two pilots. Large builds are extrapolated
-// from 13 levels (8192^3 voxels). This pilot takes one or two seconds. If the triangles do not fit
-// in memory on this grid, they are read again for a coarser pilot. A pilot that fills enclosed
-// space takes ten times as long, so it has a coarser grid.
+// from 13 levels (8192^3 voxels). A pilot with 13 levels takes one or two seconds. If the triangles
+// do not fit in memory on this grid, they are read again for a coarser pilot. A pilot that fills
+// enclosed space takes ten times as long, so it has a coarser grid.
 uint32_t pilot_levels_of(uint32_t grid_levels, SolidName solid) {
   if (solid == SolidName::kEnclosed) return kEnclosedPilotLevels;
   return std::clamp<uint32_t>(grid_levels - std::min<uint32_t>(grid_levels, 2), 12, 13);

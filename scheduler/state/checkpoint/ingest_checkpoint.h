@@ -46,8 +46,8 @@ class IngestCheckpoint {
   // triangles do not fit in memory, so that the disk must hold them anyway. Or the disk has ample
   // space.
   bool is_worthwhile(const TriangleSource& scene) const;
-  // Throws Error{kNoSpace} if memory and disk together have no space for the scene's triangles.
-  // This refuses a scene of a few bytes that declares billions of triangles. Does nothing if
+  // Throws Error{kNoSpace} if memory and disk together have no space for the scene's triangles. So
+  // a scene of a few bytes that declares billions of triangles is refused. Does nothing if
   // RunOptions::force is set or the options give the bounds.
   void check_disk_space(const TriangleSource& scene) const;
   // Enables checkpoints for a scene that was opened at Unix time `opened_ns`, and removes

@@ -12,8 +12,8 @@
 namespace voxdag {
 namespace {
 
-// The help text of the scene lists all file endings of the table of formats. It is a constant, so
-// it could become outdated.
+// The help text of the scene lists all file endings of the table of formats. The text is a
+// constant, so it could become outdated.
 TEST(BuildFields, SceneHelpListsAllEndings) {
   EXPECT_THAT(std::string(kSceneField.help),
               testing::HasSubstr("(" + list_scene_endings(", ", ", ") + ")"));

@@ -289,8 +289,8 @@ TEST_F(IngestCheckpointTest, StartsOverAndLeavesSmallScenesAlone) {
 }
 
 // trusted_from_ns() returns the time after which every change of a file also changes the file's
-// times. This is one tick of the file system's clock after the last of these times, because a
-// change within the same tick would not change them.
+// times. The result is one tick of the file system's clock after the last of the file's times,
+// because a change within the same tick would not change these times.
 TEST(TrustedFiles, AreOlderThanATickOfTheirClock) {
   constexpr int64_t kSecond = 1'000'000'000;
   const auto file = [](int64_t modified_ns, int64_t changed_ns) {
