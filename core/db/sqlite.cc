@@ -67,7 +67,7 @@ void refuse_foreign(const std::string& path) {
     code = ErrorCode::kNoSpace;
     message += ": the file system has no inodes left";
   }
-  throw Error(code, "database " + path + ": " + message);
+  throw Error(code, "database " + path + ": SQLite reports: " + message);
 }
 
 }  // namespace
