@@ -1,7 +1,7 @@
 // Random triangles in a cube: cases that no sensible model has and every builder has to survive.
 // The numbers of each kind in 1000 triangles are about:
-//     680  ordinary: from 1/16 to 1/16384 of the cube's edge; all powers of 2 between are equally
-//          likely
+//     680  ordinary: their size is from 1/16 to 1/16384 of the cube's edge; all powers of 2 in this
+//          range are equally likely
 //     160  slivers: two corners far apart, the third close to one of them or to their edge
 //      79  in an axis-aligned plane
 //       1  as large as the cube

@@ -12,7 +12,7 @@
 namespace voxdag {
 namespace {
 
-// Parts of a scene that a .glb of import_scene() does not have.
+// Parts of a scene that import_scene() does not write to the .glb.
 constexpr int kRemoved = aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS |
                          aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS | aiComponent_LIGHTS |
                          aiComponent_CAMERAS;

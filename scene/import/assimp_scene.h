@@ -23,7 +23,7 @@ class AssimpScene {
   // Returns the matrix, column by column, that converts the positions of the scene to the unit and
   // the axes of glTF: meters, y upward, z to the front.
   std::array<double, 16> to_gltf() const;
-  // Parts of the file that a .glb of import_scene() does not have.
+  // Returns warnings about the parts of the file that import_scene() does not write to the .glb.
   const WarningList& losses() const { return losses_; }
 
  private:

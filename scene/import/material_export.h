@@ -1,4 +1,4 @@
-// The materials of an assimp scene in a .glb, with their images.
+// Writes the materials of an assimp scene, with their images, to a .glb.
 #pragma once
 
 #include <assimp/material.h>

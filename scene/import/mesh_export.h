@@ -1,5 +1,5 @@
-// The arrays of an assimp mesh in a .glb: positions, texture coordinates, colors, and the indices
-// of its triangles.
+// Writes the arrays of an assimp mesh to a .glb: positions, texture coordinates, colors, and the
+// indices of its triangles.
 #pragma once
 
 #include <assimp/mesh.h>

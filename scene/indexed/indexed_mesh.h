@@ -34,8 +34,8 @@ class IndexedMesh {
 
   // Returns the place of a triangle in the file for messages, such as "face 5".
   virtual std::string place_of(uint64_t triangle) = 0;
-  // Describes the vertex index of corner `corner` of a triangle, which is out of range, for
-  // messages.
+  // Describes a vertex index that is out of range, for messages. It is the index of corner `corner`
+  // of the triangle.
   virtual std::string name_index(uint64_t /*triangle*/, int /*corner*/, uint32_t index) {
     return index == UINT32_MAX ? "a vertex with a negative or too large index"
                                : "index " + std::to_string(index);

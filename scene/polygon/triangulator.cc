@@ -29,8 +29,8 @@ bool Triangulator::triangulate_projected() {
   return false;
 }
 
-// Removes collinear corners until none or only two corners are left, and adds a degenerate triangle
-// for each. Sets kept_ to the corners that are left.
+// Removes collinear corners until no remaining corner is collinear or only two corners remain. Adds
+// a degenerate triangle for each removed corner. Sets kept_ to the remaining corners.
 void Triangulator::remove_collinear_corners() {
   Rings& ring = sweep_.rings();
   ring.reset(static_cast<uint32_t>(points_.size()));

@@ -20,8 +20,8 @@ namespace voxdag {
 Cutouts find_cutouts(FileSystem& files, const SceneMaterials& materials, unsigned threads,
                      MemoryBudget& budget, const CancelToken& cancel, WarningList& problems);
 
-// Returns the files of the images that decide which parts of triangles are cut out. An image whose
-// file cannot be opened gives a file without identity.
+// Returns the files of the images that decide which parts of triangles are cut out. For an image
+// whose file cannot be opened, the SourceFile has no identity.
 std::vector<SourceFile> cutout_files(const SceneMaterials& materials);
 
 // True if the alpha mode of a material allows it to cut out triangles or parts of triangles.

@@ -99,7 +99,7 @@ TEST_P(Cubes, RegionsOfLargeCubes) {
 }
 
 // Builds a large cube in one piece, and its eight children. The cube has as many voxels as its
-// children together, and one octree node more than they have.
+// children together, and one octree node more than they have together.
 TEST_P(Cubes, CountsAddUp) {
   const auto backend = open();
   for (const oracle::SceneKind kind : oracle::kAllKinds) {

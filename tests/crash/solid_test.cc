@@ -44,7 +44,7 @@ TEST_P(EnclosedCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
 
 TEST_P(EnclosedCrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
-// The passes over the positions of a walking cube are interrupted as well.
+// With --radius, the passes over the positions of the cube (docs/solid.md) are interrupted as well.
 class RadiusCrashTest : public EnclosedCrashTest {
  protected:
   BuildSpec spec() const override {

@@ -1,5 +1,5 @@
-// Builds enclosed solids with a seed: only the empty space around this point becomes solid.
-// Compares them with a flood fill of the oracle's shell.
+// Builds enclosed solids with a seed: only the empty space around the seed becomes solid. Compares
+// the results with a flood fill of the oracle's shell.
 #include <set>
 
 #include "core/base/error.h"

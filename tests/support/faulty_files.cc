@@ -35,8 +35,8 @@ class FaultyWriter : public voxdag::ForwardingWriter {
   }
   void sync() override {
     files_.operate([&] {
-      // Bytes that are written during the sync may not be durable after it. So only the contents
-      // from before the sync count as synced.
+      // Bytes that are written during the sync are possibly not durable after it. So only the
+      // contents from before the sync count as synced.
       std::string before = contents(path());
       ForwardingWriter::sync();
       std::lock_guard lock(files_.mutex_);

@@ -27,7 +27,8 @@ void warn_of_quantization(Document& d, int index, const std::string& where) {
          "has integers, but the file does not declare KHR_mesh_quantization; they are read");
 }
 
-// Checks accessor `index`, a part of the geometry, and marks its buffers as read. -1: does nothing.
+// Checks accessor `index`, a part of the geometry, and marks its buffers as read. Does nothing if
+// `index` is -1.
 void check_geometry(Document& d, int index, const AccessorUse& use) {
   if (index < 0) return;
   check_accessor(d, index, use);

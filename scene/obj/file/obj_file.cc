@@ -117,8 +117,8 @@ class ObjFile::Scan {
     if (corners.lacks_texture) ++use.faces_without_texture;
   }
 
-  // Adds a face of fewer than three corners, which sets no voxels. Refuses the file if a corner is
-  // not an index, as in "f 1,2,3".
+  // Counts a face of fewer than three corners, for a warning. Such a face sets no voxels. Refuses
+  // the file if a corner is not an index, as in "f 1,2,3".
   void add_small_face(const Statement& statement) {
     std::string_view arguments = statement.arguments;
     for (size_t corner = 0; has_word(arguments); ++corner) {

@@ -22,8 +22,8 @@ Crossing crossing_of(const Triangle& triangle, const Point& p, int axis);
 // along the axis, or 0 if the triangle does not cross this segment. `length` must be above 0.
 int leg_crossing(const Triangle& triangle, const Point& p, int axis, int64_t length);
 
-// Returns the winding number of p: the sum of the signs of the crossings that a ray from p against
-// the direction of the axis meets. On a closed mesh it is the same for every axis.
+// Returns the winding number of p: the sum of the signs of the crossings on a ray from p in the
+// negative direction of the axis. On a closed mesh, it is the same for every axis.
 int winding_number(const Triangles& triangles, const Point& p, int axis);
 
 }  // namespace oracle

@@ -57,7 +57,7 @@ TEST(GltfGeometry, StripsAndFans) {
             (std::vector<Corners>{first_of_fan, second_of_fan}));
 }
 
-// A strip that is longer than a window of triangles continues after it without a gap.
+// A strip that is longer than a window of triangles continues in the next window without a gap.
 TEST(GltfGeometry, LongStripAndFanCrossWindows) {
   constexpr size_t kVertices = 10000;
   std::vector<float> line;

@@ -262,7 +262,7 @@ TEST(GltfNodes, NothingToDraw) {
   EXPECT_TRUE(corners_of(scene).empty());
 }
 
-// Several files make one scene, in the given order. Reading it again gives the same order.
+// Several files make one scene, in the given order. Reading the scene again gives the same order.
 TEST(GltfNodes, SeveralFiles) {
   SceneBuilder first = corner_scene(), second = corner_scene();
   first.add_root({{"mesh", 0}});

@@ -324,7 +324,7 @@ TEST(Materials, DiffuseTextureOfSpecularGlossiness) {
   EXPECT_EQ(surfaces_of(*open.source).at(0).corners[1].texture[0], 2 * kOneImage);
 }
 
-// The materials and images of a later file are listed after the ones of the earlier files.
+// Materials and images are listed in the order of the files.
 TEST(Materials, OfSeveralFiles) {
   MemoryFiles files;
   SceneBuilder plain = one_triangle();

@@ -117,7 +117,7 @@ TEST(Textures, DamagedPages) {
   uint64_t texels = 0;
   read_all(sound, [&](uint64_t) { ++texels; });
   EXPECT_GT(texels, width * height);
-  // The first operation makes the file; each other one writes a row of tiles.
+  // The first operation makes the file. Each further operation writes a row of tiles.
   const uint64_t operations = sound.files.disk.operations();
   EXPECT_GT(operations, 15u);
   for (uint64_t at = 2; at <= operations; ++at) {

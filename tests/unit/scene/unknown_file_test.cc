@@ -92,7 +92,7 @@ Error error_of_text(const std::string& file) {
   return Error(ErrorCode::kInvalidInput, "");
 }
 
-// Text of another format is named as well if the file has an ending of text points.
+// The error also names another text format if the file's name has an ending of text points.
 TEST(UnknownFile, OtherTextsAreNotPoints) {
   EXPECT_THAT(error_of_text("version https://git-lfs.github.com/spec/v1\noid sha256:0").message(),
               HasSubstr("a.csv: is a Git LFS pointer, not the file itself: run git lfs pull"));

@@ -84,8 +84,8 @@ TEST_P(EveryKind, AnotherSeedAnotherScene) {
   EXPECT_EQ(make(options).bytes == first.bytes, GetParam() == SceneKind::kMenger);
 }
 
-// A scene that is too large for one primitive is divided into several, none of which has too many
-// vertices.
+// A scene that is too large for one primitive is divided into several primitives. None of them has
+// too many vertices.
 TEST_P(EveryKind, LargeScenesAreSplitIntoBlocks) {
   GenerateOptions options = small(GetParam());
   options.level = 3;
