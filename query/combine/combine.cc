@@ -80,9 +80,10 @@ struct Workspace {
   const LookupMemory memory;
 };
 
-// The data from which write_levels() makes a new file. For each level, index 0 for the root: the
-// results of Join (join.h), and the pairs and kept nodes (pair_levels.h). For the bricks, also the
-// combined bricks.
+// The data from which write_levels() makes a new file. `joined` has the results of Join (join.h),
+// and `pairs` has the pairs and kept nodes (pair_levels.h); both have one element per level, and
+// index 0 is the root's level. `bricks` has the results of the pairs of bricks. `reference` is the
+// reference file (reference_of() in operation.h).
 struct NewLevels {
   explicit NewLevels(const SpillSpace& space) : bricks(space) {}
   std::vector<std::unique_ptr<JoinedLevel>> joined;
@@ -162,8 +163,8 @@ class Combination {
   uint32_t level_count() const { return a_.file().brick_level() + 1; }
 
   // Joins every level of the two files (join.h), from the bricks up. For each level, returns the
-  // hashes of both files' nodes, the pairs of equal nodes, and the full nodes. Index 0 is the
-  // root's level.
+  // hashes of both files' nodes, the pairs of equal nodes, and the nodes in which all voxels are
+  // set. Index 0 is the root's level.
   std::vector<std::unique_ptr<JoinedLevel>> join() {
     std::vector<std::unique_ptr<JoinedLevel>> joined(level_count());
     progress_.begin_stage("join", a_.file().dag_nodes() + b_.file().dag_nodes(), "nodes");

@@ -8,12 +8,14 @@
 //   moved.h         the second file at an offset, which is written to a temporary file first
 //   shape.h         spheres and boxes as the second operand
 //
-// pair_levels.h works from the root down to the bricks, the others from the bricks up to the root.
+// pair_levels.h and moved.h work from the root down to the bricks. join.h, level_writer.h and
+// count_levels.h work from the bricks up to the root.
 //
 // The time depends on the sizes of the files and on the number of distinct pairs of cubes. The
 // memory is limited by the budget: lists that exceed their share, and the values (node_values.h) of
 // large levels, are stored in a scratch folder. Only the marks of kept and counted nodes
-// (pair_levels.h) must be in memory: one bit for each two words of two consecutive levels.
+// (pair_levels.h) must be in memory. Each of these two kinds of marks takes one bit for each two
+// words of two consecutive levels.
 #pragma once
 
 #include <array>
@@ -36,7 +38,8 @@ struct CombineSpec {
   Operation operation = Operation::kUnion;
   std::string output;
   // If set, moves the second file: its voxel (0, 0, 0) is placed at this voxel of the first file's
-  // grid. Then the two grids may differ, except in the edge of a voxel.
+  // grid. Then the grids of the two files can differ in position and resolution, but their voxels
+  // must have the same edge.
   std::optional<std::array<int64_t, 3>> offset;
   bool clip = false;     // drop moved voxels outside of the grid; otherwise they are an error
   bool replace = false;  // replace an existing file
@@ -65,8 +68,10 @@ struct CombineReport {
 // Writes the result to spec.output, which gets its final name when it is complete. Temporary files
 // are in a folder next to the output; combine() removes the folder at the end, also after an error.
 // If the process is killed, the next combine with the same output removes the folder. Throws Error:
-// - kInvalidInput if the grids or the hash bits of the files differ, if a file has attributes, or
-//   if moved voxels are outside of the grid and spec.clip is false;
+// - kInvalidInput if the files have different grids (with spec.offset: different edges of a voxel)
+//   or different hash bits, if a file has attributes or another node order than the order by hash
+//   (with spec.offset, the second file can have any order), or if moved voxels are outside of the
+//   grid and spec.clip is false;
 // - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled; and the errors of
 //   LockedOutputs.
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,

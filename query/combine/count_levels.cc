@@ -45,9 +45,9 @@ void CountLevels::add_nodes(uint32_t level, PairLevel& pairs) {
   add_nodes(b_, level, pairs.counted_b, below_b_);
 }
 
-// Counts the voxels and octree nodes below each counted node of a level (`nodes`, pair_levels.h).
-// Adds or subtracts these counts at the places that use the node. `below` has the counts of the
-// next finer level, and receives the counts of this level.
+// Counts the voxels and octree nodes in the subtree of each counted node of a level (`nodes`, see
+// pair_levels.h). Adds these counts to the changes of the places that use the node, or subtracts
+// them. `below` has the counts of the next finer level, and receives the counts of this level.
 void CountLevels::add_nodes(DagInput& input, uint32_t level, CountedNodes& nodes,
                             std::unique_ptr<Counts>& below) {
   const std::unique_ptr<Counts> finer = std::exchange(below, nullptr);

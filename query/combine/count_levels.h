@@ -5,8 +5,8 @@
 // (reference_of()), plus changes. The counts change at each place where the result is not the
 // reference file's node. The change of a pair is the sum of the changes of its places, so the
 // changes are computed from the bricks up. Only the nodes that are added or left out at a place,
-// and the nodes below them, must be counted. All sums are modulo 2^64, so they also represent
-// negative changes.
+// and the nodes below them, must be counted. Counts are unsigned and wrap around modulo 2^64, so
+// that they can also store negative changes.
 #pragma once
 
 #include <memory>
@@ -34,7 +34,8 @@ class CountLevels {
         pair_changes_(&bricks) {}
 
   // For each level, from the bricks up, call these three functions in this order. Call add_pair()
-  // for each place (result_rows.h) whose result is the result of a pair, by increasing pair number.
+  // for each place (result_rows.h) whose result is the result of a pair of this level, in the order
+  // of increasing pair numbers.
   void begin_level();
   // Adds the change of the counts of use.place, whose result is the result of use.pair. `has_node`
   // is false if this result is empty.

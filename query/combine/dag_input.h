@@ -53,7 +53,7 @@ class DagInput {
 
  private:
   friend class LevelCursor;
-  // The number of bytes that the system may load into memory for one access to the mapping.
+  // An upper estimate of the bytes that the system loads into memory for one access to the mapping.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
   static constexpr uint64_t kBytesBetweenChecks = uint64_t{8} << 20;
 
@@ -114,8 +114,10 @@ class LevelCursor {
     ++count_;
     load();
   }
-  // Returns words of the level some distance ahead. Most of them are pointers in nodes that next()
-  // will reach soon, so the caller can prefetch the data of their targets.
+  // Returns some words of the level that are kWordsAhead words after the beginning of the current
+  // node. Most of them are pointers in nodes that next() will reach soon, so the caller can
+  // prefetch the data of the nodes to which they point. Returns no words if the words are not
+  // verified yet, if the level has bricks, or if its nodes have 64-bit pointers.
   std::span<const uint32_t> words_ahead() const {
     const uint64_t first = offset_ + kWordsAhead;
     if (wide_ || is_brick_level_ || first + size_ > checked_) return {};

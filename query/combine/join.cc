@@ -47,11 +47,11 @@ class HashCursor {
   uint64_t offset() const { return cursor_.offset(); }
   uint64_t hash() const { return own().hash; }
   bool is_full() const { return is_full_; }
-  // True if the first file has an equal node for each child of the node. Otherwise the first file
-  // cannot have a node equal to this one.
+  // True if the first file has an equal node for each child of the current node. Otherwise the
+  // first file cannot have a node equal to the current node.
   bool is_comparable() const { return is_comparable_; }
-  // Returns the node as a Row (result_rows.h) with the offsets that its children have in the first
-  // file. Requires is_comparable().
+  // Returns the current node as a Row (result_rows.h) with the offsets that its children have in
+  // the first file. Requires is_comparable().
   const Row& row() const { return kIsA ? own() : joined_; }
   void next() {
     has_previous_ = true;
@@ -95,11 +95,11 @@ class HashCursor {
   const uint64_t full_below_;
   LevelCursor cursor_;
   std::optional<NodeLookups<NodeValues<Hash>>> lookups_;
-  // The current node and the node before it, with the children's offsets in their own file.
+  // The current node and the node before it, with their children's offsets in the visited file.
   Row rows_[2];
   int current_ = 0;
   bool has_previous_ = false;
-  Row joined_;  // not used for the first file
+  Row joined_;  // the result of row() for the second file
   bool is_comparable_ = false;
   bool is_full_ = false;
 };

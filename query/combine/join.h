@@ -1,13 +1,14 @@
 // Finds the equal nodes of two files. Without this step, combine() would visit almost all nodes of
 // two large files that differ only in a small place.
 //
-// From the bricks up, the nodes of a level are hashed, and the levels of both files, which are
-// sorted by hash, are merged. A node of the second file is equal to a node of the first file if
-// their masks are equal and their children are equal nodes. So the result does not depend on hashes
-// that are equal by chance.
+// Join works from the bricks up. On each level, it computes the hashes of all nodes. The nodes of a
+// level are sorted by hash in both files, so Join finds candidates for equal nodes by merging the
+// two sequences. A node of the second file is equal to a node of the first file if their masks are
+// equal and their children are equal nodes. So the result does not depend on hashes that are equal
+// by chance.
 //
-// Also checks two conditions that later steps rely on: every pointer points to a node, and the
-// nodes of a level are in the total order (docs/format.md). Throws Error{kCorrupt} otherwise.
+// Join also checks two conditions that later steps rely on: every pointer points to a node, and the
+// nodes of a level are in the total order (docs/format.md). It throws Error{kCorrupt} otherwise.
 #pragma once
 
 #include <cstdint>

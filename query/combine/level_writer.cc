@@ -56,7 +56,7 @@ class KeptCursor {
     cursor_->next();
     hashes_.pop();
   }
-  // Moves to the next kept node, unless the current node is kept. Loads its row.
+  // Moves to the next kept node, unless the current node is kept. Then loads the node's row.
   void find() {
     while (!cursor_->at_end() && !bits_.has(cursor_->offset())) step();
     if (!cursor_->at_end()) load();
@@ -175,8 +175,9 @@ void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   children_.reset();
 }
 
-// Adds the result of each place (result_rows.h) whose result is the result of a pair of this level
-// to children_, and the change of the place's counts to counts_. `results` has the pairs' results.
+// Passes the results of this level's pairs on to the places (result_rows.h) in `uses`, whose
+// results they are. Adds each place's result to children_, and the change of its counts to counts_.
+// `results` has the results of the pairs.
 void LevelsWriter::add_pair_results(const SpillList<PairUse>& uses,
                                     SpillSorter<KeyedNode>& results) {
   results.finish();

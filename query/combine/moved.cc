@@ -9,15 +9,17 @@
 namespace voxdag::query {
 namespace {
 
-// Cube `index` is one of 2 x 2 x 2 cubes. Returns its position on `axis`, 0 or 1.
+// Returns the position, 0 or 1, of a cube on `axis` in a block of 2 x 2 x 2 cubes. `index` is the
+// cube's index in this block, 4x + 2y + z.
 constexpr int64_t axis_bit(size_t index, size_t axis) {
   return static_cast<int64_t>(index >> (2 - axis) & 1);
 }
 
 }  // namespace
 
-// Returns the word offset of a cube of the input that has the edge of the new grid. `index` is its
-// position, in units of this edge. Returns kNoNode for an empty cube or outside the input's grid.
+// Returns the word offset of a cube of the input whose edge is the edge of the new grid. `index` is
+// the cube's position, in units of this edge. Returns kNoNode if the cube is empty or outside the
+// input's grid.
 uint64_t MovedLevels::cube_at(const std::array<int64_t, 3>& index) const {
   const int64_t depth = std::max<int64_t>(input_level(0), 0);
   for (const int64_t i : index)
@@ -83,7 +85,7 @@ void MovedLevels::number_groups(Open& level) const {
 
 void MovedLevels::expand_groups(const Open& level, Open& below) const {
   // On each axis, the first child of the new cube begins in the first (0) or in the second (1)
-  // child of the group's first cube. It begins in the second one if the remainder is at least the
+  // child of the group's first cube. It begins in the second child if remainder() is at least the
   // child's edge.
   std::array<int64_t, 3> first;
   for (size_t axis = 0; axis < 3; ++axis)

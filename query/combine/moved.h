@@ -57,11 +57,13 @@ class MovedLevels {
   };
 
   int64_t edge(uint32_t level) const { return int64_t{1} << (levels_ - level); }
-  // Returns the input's level whose cubes have the same edge as the cubes of `level`. The result is
-  // negative if they are larger than the input's grid.
+  // Returns the input's level whose cubes have the same edge as the cubes of the new file's
+  // `level`. The result is negative if these cubes are larger than the input's grid.
   int64_t input_level(uint32_t level) const {
     return static_cast<int64_t>(input_.file().grid_levels()) - levels_ + level;
   }
+  // Returns the distance in voxels, along `axis`, from the low face of a group's first cube to the
+  // low face of the new cube. It is the same for all cubes of the new file's `level`.
   int64_t remainder(uint32_t level, size_t axis) const {
     return -offset_[axis] & (edge(level) - 1);
   }

@@ -7,9 +7,10 @@
 //   2. resolve() loads one window after the other and writes the values of the window's bucket.
 //   3. next() receives the same offsets in the same order and reads the values from the buckets.
 //
-// Every node has at least two words, so offset / 2 is a different number for every node. The values
-// in memory and the windows are arrays by these numbers: a lookup is one read, whose address is
-// known early enough to prefetch it. A bit for each word of the level tells where nodes begin.
+// Every node has at least two words, so offset / 2 is a different number for every node. These
+// numbers are the indices of the arrays that store the values in memory and the windows. So a
+// lookup is one read, whose address is known early enough to prefetch it. If the values are in
+// memory, a bit for each word of the level tells whether a node with a value begins there.
 #pragma once
 
 #include <cstdint>
@@ -70,8 +71,9 @@ class NodeValues {
     if (offset < level_words_) __builtin_prefetch(&values_[offset / 2]);
   }
 
-  // For NodeLookups, which reads the values of a window as slots. A slot is for two words, and a
-  // node begins at only one of them: `begins` is 1 for the first, 2 for the second.
+  // For NodeLookups, which reads the values of a window as slots. A slot has the value for two
+  // consecutive words. A node can begin at only one of them: `begins` is 1 if a node with a value
+  // begins at the first word, 2 if it begins at the second, and 0 if there is no such node.
   using Slot = FoundValue<T>;
   class WindowReader {
    public:
@@ -88,7 +90,7 @@ class NodeValues {
    private:
     SpillReader<Entry> reader_;
   };
-  // Returns the result of a lookup from the slot of `offset`.
+  // Returns the result of a lookup of `offset`. `slot` is the slot that contains this word.
   static FoundValue<T> found(uint64_t offset, const Slot& slot) {
     return slot.begins == 1 + (offset & 1) ? slot : FoundValue<T>{};
   }
@@ -107,7 +109,7 @@ template <class Values>
 class NodeLookups {
  public:
   using Slot = typename Values::Slot;
-  // A window takes about `bytes`, and so do the buffers of all buckets together.
+  // `bytes` is the approximate memory of a window, and also of the buffers of all buckets together.
   NodeLookups(const Values& values, const SpillSpace& space, uint64_t bytes)
       : values_(values), space_(space), bytes_(bytes) {
     if (values.is_resident()) return;
@@ -141,8 +143,8 @@ class NodeLookups {
     if (offset >= values_.level_words()) return Values::nothing();
     return Values::found(offset, answers_->next(offset / 2 / window_slots_));
   }
-  // Uses each of these words as a word offset, and prefetches the value at this offset. Most of
-  // them are pointers in nodes that will be visited soon.
+  // Interprets each word as a word offset, and prefetches the value at this offset. `words` are
+  // words that LevelCursor::words_ahead() returns; most of them are pointers to nodes.
   void prefetch(std::span<const uint32_t> words) const {
     if (!values_.is_resident()) return;
     for (const uint32_t word : words) values_.prefetch(word);

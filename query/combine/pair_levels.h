@@ -1,7 +1,8 @@
 // Descends through two DAGs together, level by level, and finds
 //
 //   - the distinct pairs of cubes whose result is neither empty nor a cube of one of the files;
-//   - the *kept* nodes of each file: nodes that are a result, and all nodes below them;
+//   - the *kept* nodes of each file: nodes that become nodes of the new file because a cube of the
+//     result is equal to their cube, and all nodes below them;
 //   - the *counted* nodes of each file: nodes whose counts must be added or subtracted to compute
 //     the counts of the new file (count_levels.h), and all nodes below them.
 //
@@ -25,7 +26,8 @@
 namespace voxdag::query {
 
 // Marked (kept or counted) nodes of one level of one file. `uses` has the places (result_rows.h)
-// that use these nodes, as their result or for a change of their counts.
+// that use these nodes: the result of the place is a kept node, or the counts of the place change
+// by the counts of a counted node.
 template <class Use>
 struct MarkedNodes {
   explicit MarkedNodes(const SpillSpace& space) : uses(space), bits(space) {}
@@ -80,7 +82,7 @@ struct BrickResults {
   SpillList<KeyedCounts> counts;
 };
 
-// Collects MarkedNodes::bits for one level of one file. Only the first mark allocates memory.
+// Collects MarkedNodes::bits for one level of one file. Memory is allocated at the first mark.
 class Marks {
  public:
   Marks(uint64_t level_words, MemoryBudget& budget) : words_(level_words), budget_(&budget) {}

@@ -3,8 +3,8 @@
 // A *pair* is two cubes of the same level and position, one of each file. It is stored as a
 // NodePair: `a` and `b` are the word offsets of the cubes' nodes in the first and the second file.
 // The pairs of a level are sorted by `a`, then by `b`, and numbered in this order. A *place* is a
-// child of a pair: 8 * number of the pair + index of the child. The result of a place is the node
-// of the new file at this place, or empty.
+// child of a pair. Its number is 8 * number of the pair + index of the child. The result of a place
+// is the node of the new file at this place, or empty.
 #pragma once
 
 #include <cstdint>
@@ -80,7 +80,9 @@ struct CountUse {
   friend auto operator<=>(const CountUse&, const CountUse&) = default;
 };
 
-// A change, modulo 2^64, of the counts of the place or pair with the number `key`.
+// A change of counts. In lists of places, `key` is the number of a place; in lists of pairs, it is
+// the number of a pair. The counts are unsigned and wrap around modulo 2^64, so the change -1 is
+// stored as 2^64 - 1.
 struct KeyedCounts {
   uint64_t key = 0;
   OctreeCounts counts;
@@ -93,7 +95,8 @@ struct NewNode {
   uint64_t hash = 0;
 };
 
-// The result of the place or pair with the number `key`.
+// The node of the new file that is the result of a place or of a pair. In lists of places, `key` is
+// the number of the place; in lists of pairs, it is the number of the pair.
 struct KeyedNode {
   uint64_t key = 0;
   NewNode node;

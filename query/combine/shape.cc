@@ -71,7 +71,8 @@ uint64_t Shape::box_cover(const Position& low, const Position& high) const {
 
 // Computes in half voxels, so the center of voxel i is at 2i + 1.
 uint64_t Shape::sphere_cover(const Position& low, const Position& high) const {
-  int64_t nearest = 0, farthest = 0;  // squared distances of centers
+  // Squared distances from the sphere's center to the nearest and the farthest center of a voxel.
+  int64_t nearest = 0, farthest = 0;
   for (size_t axis = 0; axis < 3; ++axis) {
     const int64_t first = 2 * low[axis] + 1 - center_[axis],
                   last = 2 * high[axis] + 1 - center_[axis];

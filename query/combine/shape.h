@@ -1,6 +1,6 @@
 // A sphere or a box as the second operand of a difference. A shape has no nodes. Instead, it
-// computes whether a cube is empty, full or mixed. The rule is exact: a voxel is in the shape if
-// its center is. All lengths are in voxels of the grid.
+// computes whether a cube is empty, full or mixed. The rule is exact: a voxel belongs to the shape
+// if and only if the voxel's center is in the shape. All lengths are in voxels of the grid.
 #pragma once
 
 #include <array>

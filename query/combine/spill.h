@@ -195,8 +195,9 @@ class SpillSorter {
     store_run();
     items_.try_add(item, max, space_->budget);
   }
-  // Completes the sorter. Must be called after the last item was added. If `retain` is set, the
-  // items are read much later, so they are kept in memory only if they are few.
+  // Completes the sorter. Must be called after the last item was added. `retain` means that the
+  // items are read much later. Then they are kept in memory only if they take at most
+  // SpillSpace::list_bytes.
   void finish(bool retain = false) {
     sort();
     if (runs_.empty() && !(retain && items_.size() * sizeof(T) > space_->list_bytes)) return;
@@ -233,11 +234,11 @@ class SpillSorter {
 
  private:
   struct Run {
-    uint64_t next = 0;  // position of the next item to load, and of the run's end
-    uint64_t end = 0;
+    uint64_t next = 0;  // position in the file of the next item to load
+    uint64_t end = 0;   // position in the file after the run's last item
     PageBuffer<T> buffer = {};
-    uint64_t at = 0;  // the front in the buffer, and the number of items in the buffer
-    uint64_t count = 0;
+    uint64_t at = 0;     // index of the run's front item in the buffer
+    uint64_t count = 0;  // number of items in the buffer
     const T& front() const { return buffer[at]; }
   };
   static bool is_later(const Run* a, const Run* b) { return b->front() < a->front(); }

@@ -10,7 +10,8 @@
 namespace voxdag::query {
 
 // Creates a folder whose name is `prefix` and random characters. The destructor removes the folder
-// with its contents. If the process ends earlier, remove_temporary_paths() removes the folder.
+// with its contents. If a signal ends the process earlier, remove_temporary_paths()
+// (core/io/temporary_paths.h) removes the folder.
 class TemporaryWork {
  public:
   TemporaryWork(FileSystem& files, const std::string& prefix)

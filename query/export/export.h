@@ -42,7 +42,7 @@ struct ExportOptions {
   int band = 0;             // with the grid sdf: half width of the band, in voxels; 0 means 3
   bool compact = false;     // npz: leave out arrays that can be computed from the others
   bool outside = false;     // glb: only faces that are visible from outside
-  bool watertight = false;  // glb: no vertex of a rectangle is within the side of another one
+  bool watertight = false;  // glb: no vertex is inside a side of a rectangle (surface_mesh.h)
 };
 
 struct ExportFormat {

@@ -21,7 +21,7 @@ namespace voxdag::query {
 struct ExportJob {
   FileSystem& files;
   const voxdag_reader::File& file;
-  const DagView& dag;  // DAG of the file after the turn; not empty
+  const DagView& dag;  // the file's DAG in turned axes (axis_turn.h); not empty
   const WatchedFile& watched;
   Selection selection;  // in turned axes
   std::string output;

@@ -25,9 +25,10 @@ class LevelCells {
 
   // Returns the number of set cells in the grid of 2^grid_levels cells per edge. Stops counting
   // above `limit`: the result is then an arbitrary number over `limit`. `grid_levels` must be at
-  // least 2, less than the file's, and not less than in the previous call. Takes 8 bytes for each
-  // node that is two or three levels above the cells, and 2 bits for each word of these nodes.
-  // Throws Error{kOutOfMemory} if this is over the budget, and Error{kCorrupt} for a damaged file.
+  // least 2, less than the number of levels of the file's grid, and not less than in the previous
+  // call. Takes 8 bytes for each node that is two or three levels above the cells, and 2 bits for
+  // each word of these nodes. Throws Error{kOutOfMemory} if this is over the budget, and
+  // Error{kCorrupt} for a damaged file.
   uint64_t count(uint32_t grid_levels, uint64_t limit);
 
  private:

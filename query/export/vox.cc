@@ -25,7 +25,7 @@ constexpr uint32_t kModelLevels = 8;  // 256^3 voxels
 // Maximum size of a chunk in bytes, because the file stores the size as an int32.
 constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;
 constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are also int32
-constexpr uint32_t kMagicaVoxelEdge = 2048;                  // maximum of its editor
+constexpr uint32_t kMagicaVoxelEdge = 2048;                  // limit of MagicaVoxel's editor
 constexpr uint64_t kModelBytes = 12 + 12 + 12 + 4;  // SIZE chunk, and XYZI chunk without voxels
 constexpr uint64_t kChunkHeaderBytes = 12;
 
@@ -172,8 +172,10 @@ class VoxWriter {
     write_nodes(file);
     colors.palette().write(file);
     if (file.size() != total)
-      throw Error(ErrorCode::kCorrupt, job_.output + ": has " + std::to_string(file.size()) +
-                                           " bytes, expected " + std::to_string(total));
+      throw Error(ErrorCode::kCorrupt, job_.file.path() + ": the .vox file has " +
+                                           std::to_string(file.size()) + " bytes, expected " +
+                                           std::to_string(total) +
+                                           ": the file is damaged (voxdag verify reports where)");
   }
 
  private:

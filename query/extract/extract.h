@@ -26,8 +26,8 @@ namespace voxdag::query {
 
 struct ExtractSpec {
   Selection selection;
-  // If true, a cell of a coarser grid is set if at least half of its voxels are set; otherwise if
-  // any is set. Files with attributes are refused.
+  // If true, a cell of a coarser grid is set if at least half of its voxels are set, and files with
+  // attributes are refused. If false, a cell is set if at least one of its voxels is set.
   bool majority = false;
   // If true, the new grid is the smallest octree-aligned cube around the region; otherwise it is
   // the complete grid.

@@ -23,9 +23,9 @@ namespace voxdag::query {
 
 class MajorityCells {
  public:
-  // `grid_levels` is less than the file's. The bits remain charged to `budget`. Throws
-  // Error{kCorrupt}, Error{kCanceled}, Error{kOutOfMemory}, Error{kNoSpace} and
-  // voxdag_reader::Error.
+  // `grid_levels` must be less than the number of levels of the file's grid. The bits remain
+  // charged to `budget`. Throws Error{kCorrupt}, Error{kCanceled}, Error{kOutOfMemory},
+  // Error{kNoSpace} and voxdag_reader::Error.
   MajorityCells(const voxdag_reader::File& file, uint32_t grid_levels, ScratchFolder& folder,
                 MemoryBudget& budget, Progress& progress, const CancelToken& cancel);
 

@@ -1,10 +1,10 @@
-// Writes the colors, or another attribute, of a part of a global file. The attribute follows the
-// levels of the new file.
+// Writes the colors, or another attribute, of a part of a global file. The attribute is written
+// after the levels of the new file.
 //
-// The color grid of the part has the cell size of the file's color grid, or of the selected grid if
-// that is coarser. If such a grid had fewer than 4 cells per edge, the part's color grid has 4
-// smaller cells per edge. Each of them has the color of the file's cell that contains it. The color
-// of a cell of the part is
+// The color grid of the part has the cells of the file's color grid, or of the selected grid if the
+// selected grid is coarser. If fewer than 4 such cells fit along an edge of the part, the color
+// grid of the part has 4 smaller cells per edge instead. Each smaller cell has the color of the
+// file's cell that contains it. The color of a cell of the part is
 //
 //   1. the color stored in the file, if the cell is on the finest level of the color grid and the
 //      selection's region does not cut the cell;

@@ -12,8 +12,8 @@ namespace voxdag::query {
 // 2^grid_levels cells per edge. If several cells are equally near, the result is the cell with the
 // lowest Morton code. Finds nothing if the squared distance, in cells, exceeds max_squared.
 // Descends into near children first, and never into children that are farther than the best cell so
-// far. grid_levels must be at most the file's. The coordinates of `from` must be from
-// -kMaxCoordinate to kMaxCoordinate. Throws Error{kCorrupt} for a damaged DAG.
+// far. grid_levels must be at most the number of levels of the file's grid. The coordinates of
+// `from` must be from -kMaxCoordinate to kMaxCoordinate. Throws Error{kCorrupt} for a damaged DAG.
 Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
                      uint64_t max_squared);
 

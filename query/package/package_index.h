@@ -45,7 +45,7 @@ struct DirectoryPage {
 struct PackageFile {
   std::string name;
   uint64_t bytes = 0;
-  uint64_t blocks = 0;  // of a pack
+  uint64_t blocks = 0;  // number of blocks, if the file is a pack
 };
 
 struct PackageIndex {

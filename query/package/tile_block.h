@@ -38,7 +38,8 @@ class TileBlockEncoder {
   bool has_references_ = false;
   size_t leaves_ = 0;
   std::string is_old_;  // one bit per leaf: 1 if an earlier leaf of the band has the same number
-  // For each leaf with a 1 in is_old_: next_ minus the leaf's number. old_[i] has byte i of each.
+  // For each leaf with a 1 in is_old_, the value of next_ when the leaf was added, minus the leaf's
+  // number. old_[i] has byte i of all these differences.
   std::array<std::string, 4> old_;
 };
 

@@ -53,7 +53,7 @@ struct PacketJob {
   struct Level {
     const uint32_t* words;
     uint64_t count;
-    uint64_t any_node;  // at smaller offsets, even the largest node fits in the level
+    uint64_t any_node;  // a node of any size that begins below this offset ends in the level
     bool wide_children;
   };
 

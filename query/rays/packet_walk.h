@@ -235,7 +235,7 @@ class PacketWalk {
     return low + (kUpperOn[index] & all(half));
   }
 
-  // Visits a node that all of `rays` may cross.
+  // Visits a node. `rays` are the rays that can cross its cell, as bits.
   void visit(uint32_t depth, Int4 low, int32_t edge, uint64_t offset, uint64_t rays) {
     const Node n = node(depth, offset);
     const int32_t half = edge / 2;

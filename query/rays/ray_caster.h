@@ -6,7 +6,7 @@
 // same formula. So the cells on both sides of a plane get the same t to the last bit, and there are
 // no cracks at any resolution. The ray is mirrored so that its direction is positive on every axis.
 //
-// A ray may widen into a cone. An occupied cell that is no larger than the width of the cone at the
+// A ray can widen into a cone. An occupied cell that is no larger than the width of the cone at the
 // cell counts as solid. So the descent ends where finer cells would be invisible.
 //
 // Immutable; any number of threads may cast rays.

@@ -19,8 +19,8 @@ namespace voxdag::query {
 
 // A copy of a ray, mirrored so that its direction is positive on every axis.
 struct MirroredRay {
-  // Components of a direction with a smaller magnitude are replaced by this number, because their
-  // inverse could be infinite.
+  // A component of a direction whose magnitude is less than this number is replaced by this number.
+  // Otherwise, the inverse of the component could be infinite.
   static constexpr double kMinComponent = 1e-18;
 
   static double component(double d) { return std::max(std::fabs(d), kMinComponent); }

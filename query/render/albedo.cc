@@ -23,7 +23,8 @@ const std::array<double, 256>& linear_of() {
   return table;
 }
 
-// A color scale from few to many, sRGB. Its lightness increases, so that it can be printed in gray.
+// The color scale of Shade::kSharing in sRGB, from one place in the octree to the most places. Its
+// lightness increases, so that the scale can also be printed in gray.
 constexpr std::array<Vec, 5> kScale = {Vec{{0.27, 0.05, 0.37}}, Vec{{0.23, 0.32, 0.55}},
                                        Vec{{0.13, 0.57, 0.55}}, Vec{{0.37, 0.79, 0.38}},
                                        Vec{{0.99, 0.91, 0.14}}};

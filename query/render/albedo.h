@@ -1,5 +1,6 @@
-// The share of light that a surface reflects: from the colors of a file, or a property of the DAG
-// for figures (Shade). Without colors, surfaces are gray plaster.
+// The albedo of surfaces: the share of light that a surface reflects. It is the color that the file
+// stores, or a gray like plaster if the file has no colors. For figures, it can also show a
+// property of the DAG (Shade):
 //
 //   sharing   how often the node or brick at the surface occurs in the octree, on a logarithmic
 //             scale: from dark violet (once) over green to yellow (as often as the most frequent
@@ -59,7 +60,8 @@ class ShadeColors {
 
   const DagView& dag_;
   const Shade shade_;
-  // For each level, the number of places of each node or brick, by half its word offset.
+  // For each level, the number of places of each node or brick in the octree. The index of a node
+  // is half its word offset.
   std::vector<std::vector<uint64_t>> places_;
   double log_max_places_ = 0;  // logarithm of the largest number of places of a brick
 };

@@ -6,8 +6,8 @@ namespace voxdag::query {
 
 GBufferPixel GBuffer::smoothed(int x, int y, double pixel_spread) {
   constexpr int kReach = 4;  // pixels on each side
-  constexpr double kPlaneSlack =
-      3;  // maximum distance of a neighbor from the plane, in pixel widths
+  // Maximum distance of a neighbor from the plane of the pixel's surface, in pixel widths.
+  constexpr double kPlaneSlack = 3;
   GBufferPixel pixel = at(x, y);
   const bool on_surface = pixel.coverage > 0;
   const Vec normal = pixel.normal, offset = pixel.offset;

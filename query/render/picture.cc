@@ -51,7 +51,8 @@ std::string encode_picture(const Picture& picture, std::string_view path) {
   if (!is_jpeg_name(path)) return encode_png(picture);
   if (picture.channels != 3)
     throw Error(ErrorCode::kInvalidInput,
-                "a JPEG file cannot be transparent: expected a name that ends in .png");
+                std::string(path) +
+                    ": a JPEG file cannot be transparent: expected a name that ends in .png");
   return encode_jpeg(static_cast<uint32_t>(picture.width), static_cast<uint32_t>(picture.height),
                      picture.bytes, kComment);
 }

@@ -26,7 +26,8 @@ const NamedDirection kDirections[] = {
 
 // Returns the width, in voxels, of the rays that are cast to choose a view: 1/4096 of the grid's
 // edge, or 0 if the grid has at most 4096 voxels per edge. Thinner rays would visit finer cells.
-// These give the same view, but are scattered over the file and may have to be read from disk.
+// Finer cells give the same view, but they are scattered over the file, so reading them from disk
+// would take time.
 double finest_width(const DagView& dag) {
   constexpr int64_t kCells = 4096;
   return dag.resolution() > kCells ? static_cast<double>(dag.resolution() / kCells) : 0;

@@ -34,8 +34,8 @@ void check_address(const DagView& dag, const TileAddress& root, const CheckedBlo
 }
 
 // Appends the nodes of a level to `words`. Each appended node has the numbers of its children in
-// `children` instead of their offsets; children without a number get the next one. Returns the word
-// index, after the header, at which each node begins.
+// `children` instead of their offsets. A child without a number gets the next number. Returns the
+// word index at which each node begins, counted from the end of the tile's header.
 std::vector<uint32_t> add_nodes(const DagView& dag, const CheckedBlocks* blocks, uint32_t level,
                                 const std::vector<uint64_t>& offsets, OffsetTable& children,
                                 std::vector<uint32_t>& words) {

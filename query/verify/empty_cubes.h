@@ -1,6 +1,7 @@
-// Finds the cubes of radius + 1 voxels per edge near one voxel, the center, whose voxels are all
-// empty. A check of enclosed solids uses them. A walk (docs/solid.md, "Enclosed") is a sequence of
-// steps of such a cube. Voxels outside the grid are empty.
+// Finds the empty cubes of radius + 1 voxels per edge near one voxel, which is called the center. A
+// cube is empty if none of its voxels is set. A check of enclosed solids uses these cubes: a walk
+// (docs/solid.md, "Enclosed") is a sequence of steps of such a cube. Voxels outside the grid are
+// empty.
 #pragma once
 
 #include <array>
@@ -22,8 +23,8 @@ class EmptyCubes {
   // True if an empty cube contains the center.
   bool has_center() const;
 
-  // A step of all empty cubes that touch one side of the center. Each of them would contain the
-  // center after a move by one voxel along an axis.
+  // A step of all empty cubes that are next to one side of the center. Each of them would contain
+  // the center after a move by one voxel toward the center.
   struct Step {
     bool has_cubes = false;
     std::vector<VoxelPlace> stops;  // set voxels that at least one of the cubes would move over

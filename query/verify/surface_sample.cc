@@ -70,8 +70,8 @@ double area(const FixedTriangle& t) {
   return std::sqrt(sum);
 }
 
-// The triangles of the scene that may touch the grid. Each function calls visit() with all of them,
-// in the order of the scene.
+// The triangles of the scene that can touch the grid. Each function calls visit() for each of these
+// triangles, in the order of the scene.
 class SnappedScene {
  public:
   SnappedScene(TriangleSource& scene, const Grid& grid, Progress& progress,
@@ -161,8 +161,8 @@ size_t bit_of(const SampleBox& box, int64_t x, int64_t y, int64_t z) {
                              (z - box.low[2]));
 }
 
-// Sets the voxels of the box in which the triangle crosses a row along `axis` through their
-// centers. `test` is a RowTest (crossing.h).
+// Visits the rows along `axis` through the centers of the box's voxels. If the triangle crosses a
+// row in a voxel of the box, sets this voxel. `test` is a RowTest (crossing.h).
 template <class Test>
 void mark_rows(const Test& test, int axis, SampleBox& box) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;

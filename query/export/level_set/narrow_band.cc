@@ -141,15 +141,15 @@ void BandTile::distances(const Position& at, BandSquares& out) {
     if (out[i] == 0) out[i] = static_cast<int16_t>(-to_empty[i]);
 }
 
-// Computes (2 distance)^2 from each cell of a leaf to the nearest cell that is set, or to the
-// nearest empty cell. The result is 0 for cells that are of this kind themselves.
+// Computes (2 distance)^2 from each cell of a leaf to the nearest set cell if `is_set` is true,
+// otherwise to the nearest empty cell. The result is 0 for a cell that is itself of this kind.
 void BandTile::distances_to(bool is_set, const Position& at, BandSquares& out) {
   const auto limit = static_cast<uint16_t>(4 * width_ * width_);
   const auto window = static_cast<size_t>(kBandLeafEdge + 2 * width_);
   const auto n = static_cast<size_t>(kBandLeafEdge);
   size_t i = 0;
-  // The window's axes are stored in the order z, y, x, so that min_along() always steps along the
-  // first axis that is not done.
+  // The window's axes are stored in the order z, y, x. Each of the three calls of min_along() below
+  // steps along one axis: first z, then y, then x.
   for (size_t z = 0; z < window; ++z)
     for (size_t y = 0; y < window; ++y)
       for (size_t x = 0; x < window; ++x, ++i) {

@@ -141,9 +141,10 @@ class BandWalk {
   BandTile tile_;
 };
 
-// Visits the parts of a level set: calls visit_leaf(low, at, tile) for each leaf with cells in the
-// band, and for each leaf of set cells that extends beyond band_domain(); tile.distances(at)
-// computes its distances. Calls visit_full(low, edge) for each other cube of set cells that are all
+// Visits the parts of a level set. Calls visit_leaf(low, at, tile) for each leaf with cells in the
+// band, and for each leaf of set cells that extends beyond band_domain(). `low` is the leaf's low
+// corner in the grid, `at` its position in the tile, and tile.distances() computes its distances.
+// Calls visit_full(low, edge) for each cube in band_domain() that has only set cells, all of them
 // farther from the surface than `width`. Both functions return a bool; false ends the walk.
 template <class VisitLeaf, class VisitFull>
 void for_each_band_part(const DagView& dag, const Selection& selection, int width,

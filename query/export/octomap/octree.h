@@ -40,7 +40,7 @@ enum class Content : uint8_t { kNothing, kSomething, kFull };
 // lowest bit of x.
 class BlockCells {
  public:
-  // `place` is place_of(job).
+  // `place` is octomap_place(job).
   BlockCells(const ExportJob& job, const Position& place) : job_(job), place_(place) {}
 
   // Reads the selected cells of the block whose low corner is `corner`, in cells from the octree's

@@ -37,8 +37,8 @@ class LevelReader {
       at += 1 + (static_cast<uint64_t>(popcount8(children.mask)) << wide);
     }
   }
-  // Returns an array for the rows of a level. Its index is half the word offset of a node or brick,
-  // because each of these has at least two words.
+  // Returns an array for the row numbers (in NodeLevels) of a level's nodes or bricks. The index of
+  // a node or brick is half its word offset, because each of them has at least two words.
   PooledArray<uint32_t> row_numbers(uint32_t depth) const {
     return {memory_, dag_.level(depth).words.size() / 2 + 1};
   }
@@ -149,7 +149,9 @@ std::vector<PageBuffer<uint32_t>> filled_levels(const DagView& dag, uint32_t gri
   PooledMemory memory{budget, pool};
   const NodeLevels levels = LevelReader(dag, grid_levels, memory, cancel).read();
   const SpaceLabels labels(memory, levels, &cancel);
-  // The faces of the root's cube are the border of the grid, so all labeled components are outside.
+  // SpaceLabels labels the components of the empty space that touch a face of a node's cube. The
+  // faces of the root's cube are the border of the grid. So all labeled components of the root are
+  // outside.
   const std::vector<uint8_t> is_outside(labels.count(0, 0), 1);
   SubDagTables tables(memory, static_cast<int>(grid_levels));
   fill_enclosed(memory, labels, is_outside, tables, &cancel);

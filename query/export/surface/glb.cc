@@ -219,8 +219,8 @@ ExportReport write_glb(const ExportJob& job) { return write_glb_within(job, kMax
 
 ExportReport write_glb_within(const ExportJob& job, uint64_t max_bytes) {
   const uint64_t most = max_bytes - kMaxGlbJsonBytes;
-  // More rectangles than this need 32-bit indices, because a vertex belongs to at most 12
-  // rectangles: they have over 65535 vertices.
+  // A vertex belongs to at most 12 rectangles. So a mesh with more rectangles than this has more
+  // than 65535 vertices and needs 32-bit indices.
   constexpr uint64_t kFewRectangles = 3 * uint64_t{kMaxShortIndexedVertices};
   std::optional<Surface> surface(std::in_place, job,
                                  std::max(kFewRectangles, most / (6 * sizeof(uint32_t))));

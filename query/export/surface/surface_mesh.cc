@@ -138,8 +138,9 @@ void SurfaceMesh::add_closed_rectangle(const SurfaceRectangle& r, const VertexTa
 }
 
 // Adds the triangles of the current rectangle. They form a strip from side u0 to side u1, between
-// the points of the sides v0 and v1. The first and the last triangle have all of the side u0 or u1
-// as one edge, so each of them is divided at the points of its side.
+// the points of the sides v0 and v1. The complete side u0 is an edge of the first triangle, and the
+// complete side u1 is an edge of the last one. So these two triangles are divided further, at the
+// points of these sides.
 void SurfaceMesh::add_strip(bool upward) {
   const auto& [low, high, first, last] = sides_;
   const size_t steps = low.size() + high.size() - 2;
