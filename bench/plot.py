@@ -4,7 +4,7 @@
     tools/bench headline --json headline.json
     tools/bench plot headline.json headline.png
 
-Needs matplotlib (Debian: python3-matplotlib; PyPI: matplotlib), which no other benchmark does.
+Needs matplotlib (Debian: python3-matplotlib; PyPI: matplotlib). No other benchmark needs it.
 """
 
 import argparse

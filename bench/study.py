@@ -6,8 +6,8 @@ and prints one line:
 
     BUILD cpu SECONDS s (wall SECONDS) | voxels COUNT ... dag COUNT nodes
 
-It may contain meshes as NAME.obj.xz (see MESHES); other scenes are converted. It is compiled with
--march=native, which the released binary is not.
+The folder can contain meshes as NAME.obj.xz (see MESHES); other scenes are converted to .obj. The
+program is compiled with -march=native. The released binary of voxdag is not.
 """
 
 import lzma
@@ -21,7 +21,7 @@ from scenes import HAIRBALL, glb_to_obj
 # Scenes whose mesh is in the folder, with the mesh's name.
 MESHES = {"sponza": "sponza", "dragon_100k": "dragon"}
 
-# The reference program snaps vertices a little differently, so its counts may differ from voxdag's
+# The reference program snaps vertices a little differently, so its counts can differ from voxdag's
 # by these fractions. The comparison only shows that both programs did the same work.
 VOXELS_WITHIN = 0.005
 NODES_WITHIN = 0.03

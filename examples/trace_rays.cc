@@ -12,8 +12,8 @@ namespace {
 using voxdag::query::Coordinates;
 using voxdag::query::DagFile;
 
-// Looks along the z axis. Near voxels are dark, far voxels are light, and a pixel without a voxel
-// is blank.
+// Prints the scene as seen along the z axis, one character per ray. Near voxels are dark, and far
+// voxels are light. A ray that hits no voxel prints a blank.
 void draw(const DagFile& dag) {
   constexpr int kColumns = 64, kRows = 32;
   const double edge = static_cast<double>(dag.resolution());

@@ -27,8 +27,8 @@ constexpr size_t kReaderBoxes = 20;
 // memory for Sponza on a grid of this size.
 constexpr uint32_t kMaxOtherLevels = 11;
 
-// Prints a timing, and whether its `found` differs from expected->found. `expected` is the timing
-// of the first library; null if the two libraries need not find the same.
+// Prints a timing, and whether its `found` differs from expected->found. `expected` is an earlier
+// timing of the same queries. It is null if there is none, or if the two results need not be equal.
 void print(const char* who, const char* what, const Timing& timing,
            const Timing* expected = nullptr) {
   std::printf("  %-22s %-22s %10.4f M/s   found %llu%s\n", who, what, timing.per_second / 1e6,

@@ -13,7 +13,7 @@
 // - cold: the file was dropped from the page cache (unless another process keeps it there);
 // - warm: the file is in memory;
 // - comparing: the checksum of each block of the file is compared at the first use of the block;
-// - compared: as before, but all checksums have been compared.
+// - compared: the same once more, so the checksums of all used blocks have already been compared.
 //
 // VIEWS is a file whose lines have a name and the camera options of `voxdag render`. With it, only
 // these views are measured, until no cell is wider than P pixels. The viewer uses P = 0.75.

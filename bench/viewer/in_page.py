@@ -1,6 +1,6 @@
 """JavaScript functions that the measurement runs in the viewer's page."""
 
-# By default the browser keeps only 250 entries.
+# By default, the browser keeps the timing entries of only 250 requests.
 KEEP_ENTRIES = "performance.setResourceTimingBufferSize(200000);"
 
 # Draws pictures in large parts; a slow, busy machine would otherwise draw very many small parts.

@@ -44,8 +44,8 @@ enum class CutoutRule { kDefault, kSkip, kKeep };
 // kNone fills nothing: only voxels that the surface touches are set.
 enum class SolidName { kNone, kWinding, kParity, kEnclosed };
 
-// The order of the nodes in the levels of the file (docs/format.md, "Node order"). kFirstParent is
-// faster to read; kHash can be combined with other files.
+// The order of the nodes in the levels of the file (docs/format.md, "Node order"). A file in the
+// order kFirstParent is faster to read. A file in the order kHash can be combined with other files.
 enum class OrderName { kHash, kFirstParent };
 
 struct BuildOptions {

@@ -206,7 +206,8 @@ TEST_F(CApiTest, OpensAFileInMemory) {
   EXPECT_EQ(voxdag_open_memory(nullptr, 8, &none), VOXDAG_INVALID_INPUT);
 }
 
-// Many lookups, for which a mapped file gets huge pages and a table of its top cells.
+// A mapped file and a file in memory give the same results for many lookups. For so many lookups,
+// DagFile makes a table of the top cells, and requests huge pages for the mapped file.
 TEST(DagFileInMemory, AnswersManyLookups) {
   const DagFile mapped(kPath);
   const std::string bytes = read_bytes(kPath);

@@ -77,8 +77,8 @@ class Combine : public testing::Test {
   CancelToken never_;
 };
 
-// Returns the voxels at whose position is_set(in_a, in_b) is true, where the arguments tell whether
-// `a` and `b` have the voxel.
+// Returns the voxels for which is_set(in_a, in_b) is true. `in_a` tells whether the voxel is set in
+// `a`, and `in_b` whether it is set in `b`.
 template <class IsSet>
 oracle::Voxels voxels_of(const oracle::Voxels& a, const oracle::Voxels& b, const IsSet& is_set) {
   oracle::Voxels voxels(a.edge());

@@ -56,7 +56,8 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   int refused = 0;
   for (int round = 0; round < 60; ++round) {
     std::string damaged = intact;
-    // Damages one of the first words of a page, because the levels are small and begin at pages.
+    // Damages one of the first words of a page, because each level begins at a page boundary and
+    // has only a few words.
     const size_t pages = (intact.size() - kPage) / kPage;
     const size_t at = kPage * (1 + random() % std::max<size_t>(pages, 1)) + 4 * (random() % 8);
     if (at + 4 > damaged.size()) continue;

@@ -47,7 +47,8 @@ class LevelSetTest : public testing::Test {
     file_ = open_global_file(folder_.file("a.vdag"));
     dag_.emplace(*file_);
   }
-  // Numbers of the cells of a box; `otherwise` outside of it and before they are set.
+  // Stores a number for each cell of a box. The number is `otherwise` for cells that are not set
+  // yet and for cells outside the box.
   class Cells {
    public:
     Cells(const Region& box, int otherwise)
@@ -110,7 +111,8 @@ class LevelSetTest : public testing::Test {
     EXPECT_EQ(repeated, 0u);
     return squares;
   }
-  // Compares the visited cells with distances to all cells of the other kind.
+  // Compares the numbers of visited() with (2 distance)^2 to the nearest cell of the other kind,
+  // set or empty, which is found by trying all cells nearby.
   void expect_right(const Selection& selection, int width) const {
     const int64_t w = width;
     Cells kinds(whole_grid(selection.grid_levels), 0);
@@ -164,14 +166,15 @@ TEST_F(LevelSetTest, DistancesEqualTheOracle) {
   expect_right({2, whole_grid(2)}, 3);
 }
 
-// The band of a cube of full tiles has no bricks with empty cells.
+// A cube that consists of full bricks has a band, although no brick has both set and empty cells.
 TEST_F(LevelSetTest, AlignedCubesHaveABand) {
   write(voxels_where(5, [](int x, int y, int z) { return x >= 8 && x < 24 && y >= 16 && z < 16; }));
   expect_right({5, whole_grid(5)}, 2);
   expect_right({5, {{9, 17, 1}, {22, 30, 15}}}, 2);  // cuts a full cube
 }
 
-// Regions without 3^3 set voxels have signs if the file has an inside.
+// The level set of a region that is too thin for a cube of 3^3 set voxels has signs if the complete
+// file has an inside (narrow_band.h).
 TEST_F(LevelSetTest, ThinRegionsOfASolid) {
   write(voxels_where(5, [](int x, int, int) { return x < 17; }));
   EXPECT_TRUE(has_inside(*dag_, CancelToken{}));

@@ -66,8 +66,8 @@ Position next_cell(Position cell, int direction) {
   return cell;
 }
 
-// Returns the faces that the triangles cover. The doubled area of the triangles at each face must
-// be exactly the doubled area of whole faces: each face is covered once.
+// Returns the faces that the triangles cover. Checks with sample points that each of these faces is
+// covered completely and only once.
 std::set<Face> covered_faces(const SurfaceTriangles& mesh) {
   std::map<Face, double> covered;
   for (const auto& triangle : mesh.triangles) {
@@ -78,7 +78,8 @@ std::set<Face> covered_faces(const SurfaceTriangles& mesh) {
     const size_t u = (axis + 1) % 3, v = (axis + 2) % 3;
     const int64_t area = (b[u] - a[u]) * (c[v] - a[v]) - (b[v] - a[v]) * (c[u] - a[u]);
     EXPECT_NE(area, 0) << "a degenerate triangle";
-    // Samples the triangle at points that no edge between integer points of small triangles meets.
+    // Finds the sample points that are in the triangle. The sample points are at places through
+    // which no edge of a small triangle with integer corners passes.
     constexpr int kSamples = 7;
     const auto side = [&](const SurfacePoint& p, const SurfacePoint& q, double s, double t) {
       return (static_cast<double>(q[u] - p[u]) * (t - static_cast<double>(p[v])) -
@@ -271,7 +272,8 @@ TEST_F(SurfaceMeshTest, OutsideHasTheFacesThatAFloodReaches) {
   }
 }
 
-// The outside of a region is that of the complete grid, so the region's border has no faces.
+// In an export of a region, `outside` refers to the complete grid. So the border of the region has
+// no faces.
 TEST_F(SurfaceMeshTest, OutsideOfARegionIsThatOfTheGrid) {
   options_.outside = true;
   const std::set<Position> set = cells(5), outside = flooded(set, 32);

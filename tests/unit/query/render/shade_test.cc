@@ -24,7 +24,7 @@ SurfaceHit shaded_hit(uint32_t depth, int64_t x, int64_t y, int64_t z) {
 }
 double color_distance(const Vec& a, const Vec& b) { return length(a - b); }
 
-// Seven of the eight lower bricks are equal. One brick is different.
+// Seven of the eight bricks of the scene are equal. The brick at the origin has other voxels.
 TEST(ShadeColors, SharingShowsHowOftenABrickOccurs) {
   oracle::Voxels voxels(16);
   for (int i = 0; i < 8; ++i) voxels.set(4 * (i >> 2), 4 * (i >> 1 & 1), 4 * (i & 1));

@@ -18,7 +18,7 @@ namespace {
 
 // A grid of 2^16 voxels per edge with one small cluster of voxels in each of 256^3 cells: nodes
 // with all children, then nodes with one child. Rays pass through hundreds of cells and rarely hit
-// one.
+// a cluster.
 VoxelScene dust() {
   VoxelScene scene = VoxelScene::wall(16, 0);
   for (uint32_t level = 0; level < 14; ++level) {

@@ -100,8 +100,8 @@ TEST_P(ReorderErrors, Canceled) {
 INSTANTIATE_TEST_SUITE_P(Orders, ReorderErrors,
                          testing::Values(NodeOrder::kByFirstParent, NodeOrder::kByHash));
 
-// combine() rejects files in the order by first parent. A file that is moved may have this order,
-// because its nodes are sorted again.
+// combine() rejects files in the order by first parent. But if the second file is moved, it can
+// have this order, because combine() sorts the nodes of a moved file again.
 TEST_F(Reorder, CombineNeedsTheOrderByHash) {
   write_global(path("a"), random_voxels(7, 64));
   write_global(path("b"), random_voxels(8, 64));

@@ -233,8 +233,8 @@ bool has_tile(const DagView& dag, uint32_t depth, const TileAddress& root) {
   }
 }
 
-// A request may contain any word offset. encode_tile() gives a tile or an error, and always a tile
-// if a node is at this offset.
+// For any word offset, encode_tile() gives a tile or an error. It always gives a tile if a node is
+// at this offset.
 TEST(Tile, AnyOffsetIsAnsweredOrRefused) {
   const QueryFile scene(voxdag::random_voxels(5, 64));
   const File file(scene.path());
