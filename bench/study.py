@@ -35,7 +35,7 @@ class Study:
         for path in self.source.iterdir():
             if path.suffix in (".h", ".cpp"):
                 shutil.copyfile(path, self.folder / path.name)
-        # The sources may use an aligned load on a heap object that is not 32-byte aligned.
+        # The sources can contain an aligned load on a heap object that is not 32-byte aligned.
         header = self.folder / "build.h"
         text = header.read_text().replace("_mm256_load_si256(", "_mm256_loadu_si256(")
         header.write_text(text)

@@ -6,7 +6,7 @@
 //     options.output = "scene.vdag";
 //     const voxdag::BuildResult result = voxdag::build(options);
 //
-// A build may be interrupted at any time, even by SIGKILL: the same call resumes it from its work
+// A build can be interrupted at any time, even by SIGKILL: the same call resumes it from its work
 // folder and produces the same bytes. Every byte of the file depends only on the scene and the
 // geometry options, never on memory, threads or folders.
 //
@@ -143,7 +143,7 @@ struct BuildResult {
   uint32_t grid_levels = 0;
   std::array<double, 3> origin{};  // the low corner of the grid, in the units of the scene
   double edge = 0;                 // edge of the grid, in the units of the scene
-  uint64_t triangles = 0;          // triangles that may touch the grid
+  uint64_t triangles = 0;          // triangles that can touch the grid
   uint64_t dropped_outside = 0;    // triangles that miss the grid
   uint64_t dropped_invalid = 0;    // invalid triangles (see skip_invalid)
   uint64_t voxels = 0;

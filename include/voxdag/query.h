@@ -39,7 +39,7 @@ using Coordinates = std::array<double, 3>;
 // Red, green and blue in sRGB, and alpha. Alpha is 255 for a color, 0 if the cell has no color.
 using Rgba = std::array<uint8_t, 4>;
 
-// A unit vector, or zeros.
+// The normal of a cell: a unit vector, or zeros if the cell is not set.
 using Normal = std::array<float, 3>;
 
 inline constexpr uint32_t kNoMaterial = UINT32_MAX;
@@ -164,7 +164,7 @@ class DagFile {
   void nearest(std::span<const Position> points, uint32_t grid_levels, double max_distance,
                std::span<Nearest> cells, unsigned threads = 1) const;
 
-  // Returns the cell that contains a point of the scene's space. The cell may be outside the grid,
+  // Returns the cell that contains a point of the scene's space. The cell can be outside the grid,
   // at most 2^62 cells away. A point within rounding error of a cell boundary counts as on the
   // boundary, so it is in the cell above the boundary.
   Position world_to_cell(const Coordinates& world, uint32_t grid_levels) const;

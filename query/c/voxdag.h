@@ -13,7 +13,7 @@
  * immutable: any number of threads may query it concurrently. docs/library.md describes conventions
  * and units.
  *
- * A struct that may get more members in a later version begins with `struct_size`, which the caller
+ * A struct that can get more members in a later version begins with `struct_size`, which the caller
  * sets to the sizeof of the struct. Programs compiled with this header run with every later
  * libvoxdag.so of the same soname. */
 #ifndef VOXDAG_H
@@ -128,7 +128,7 @@ VOXDAG_API voxdag_status voxdag_open(const char* path, voxdag_file** file);
  * They must remain valid and unchanged until voxdag_close(). They are copied if `data` is not
  * aligned to 8 bytes. */
 VOXDAG_API voxdag_status voxdag_open_memory(const void* data, size_t size, voxdag_file** file);
-/* Closes a file. Ignores a null pointer. No other thread may be using the file. */
+/* Closes a file. Ignores a null pointer. No thread may use the file during this call or later. */
 VOXDAG_API void voxdag_close(voxdag_file* file);
 /* Fills the first facts->struct_size bytes of `facts`. */
 VOXDAG_API voxdag_status voxdag_get_facts(const voxdag_file* file, voxdag_facts* facts);

@@ -63,7 +63,8 @@ class CountLevels {
   // Changes of the counts of the places (result_rows.h) whose results are pairs or nodes of the
   // current level.
   std::unique_ptr<SpillSorter<KeyedCounts>> places_;
-  // The counts of the counted nodes of the level that was added last, for each file.
+  // For each file: the counts of the counted nodes (pair_levels.h) of the level that was added
+  // last.
   std::unique_ptr<Counts> below_a_, below_b_;
 };
 

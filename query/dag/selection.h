@@ -15,7 +15,7 @@ namespace voxdag::query {
 // `origin + cell * edge` is in this cell, and a box with such corners has no extra layer of cells.
 double world_to_cells(const voxdag_reader::File& file, uint32_t grid_levels, size_t axis,
                       double world);
-// Returns the cell that contains the coordinate `world`. The cell may be outside the grid. The
+// Returns the cell that contains the coordinate `world`. The cell can be outside the grid. The
 // result is limited to the range from -2^62 to 2^62.
 int64_t world_to_cell(const voxdag_reader::File& file, uint32_t grid_levels, size_t axis,
                       double world);

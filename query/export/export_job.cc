@@ -45,7 +45,7 @@ std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
 
 void refuse_size(const ExportJob& job, const std::string& problem,
                  const std::function<bool(uint32_t grid_levels)>& fits, ErrorCode code) {
-  // Tries the coarsest grid first, then finer ones. Testing a grid that does not fit may take long,
+  // Tries the coarsest grid first, then finer ones. Testing a grid that does not fit can take long,
   // and in this order only one such grid is tested.
   uint32_t end = kBrickLevels;
   {

@@ -24,8 +24,9 @@ namespace {
 constexpr uint32_t kModelLevels = 8;  // 256^3 voxels
 // Maximum size of a chunk in bytes, because the file stores the size as an int32.
 constexpr uint64_t kMaxVoxBytes = (uint64_t{1} << 31) - 1;
-constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;  // node ids are also int32
-constexpr uint32_t kMagicaVoxelEdge = 2048;                  // limit of MagicaVoxel's editor
+// Maximum number of instances, because the ids of the two nodes of each instance are also int32.
+constexpr uint64_t kMaxVoxModels = (uint64_t{1} << 31) / 4;
+constexpr uint32_t kMagicaVoxelEdge = 2048;         // limit of MagicaVoxel's editor
 constexpr uint64_t kModelBytes = 12 + 12 + 12 + 4;  // SIZE chunk, and XYZI chunk without voxels
 constexpr uint64_t kChunkHeaderBytes = 12;
 

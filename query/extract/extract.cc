@@ -38,7 +38,8 @@ constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
 constexpr unsigned kMaxWorkers = 256;  // each has an open file
-// Estimated memory per node while the DAG of a cube is built. It gives the initial number of cubes.
+// Estimated memory per node while the DAG of a cube is built. The initial number of cubes is
+// computed from this estimate.
 constexpr uint64_t kBytesPerNode = 128;
 // If the levels that are read have at most this number of nodes in total, the complete grid is one
 // cube, which one thread builds. This is faster than several threads, because each thread would

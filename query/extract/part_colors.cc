@@ -82,9 +82,9 @@ class ResidentPages {
   }
 
  private:
-  // Number of bytes that the system may load for one access to a page that is not in memory.
+  // Number of bytes that the system can load for one access to a page that is not in memory.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
-  static constexpr uint64_t kMinVisits = 512;  // these may load 32 MiB
+  static constexpr uint64_t kMinVisits = 512;  // these can load 32 MiB
   const voxdag_reader::File& file_;
   const uint64_t limit_bytes_;
   const unsigned threads_;

@@ -162,7 +162,7 @@ constexpr size_t kManyQueries = size_t{1} << 14;
 // read of 2 MiB, and for a file that is larger than half of the machine's memory.
 void DagFile::State::prepare_for_queries(size_t count) {
   if (!is_mapped || count < kManyQueries || file->file_bytes() > default_memory()) return;
-  // The system may ignore this request: pages already in memory keep their size, and not every
+  // The system can ignore this request: pages already in memory keep their size, and not every
   // system supports huge pages for files.
   std::call_once(huge_pages, [&] {
     madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), MADV_HUGEPAGE);

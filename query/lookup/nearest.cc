@@ -44,7 +44,7 @@ class NearestSearch {
     return morton_encode(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]),
                          static_cast<uint32_t>(p[2]));
   }
-  // True if a cube at the squared distance `squared` may have a better cell than the best cell so
+  // True if a cube at the squared distance `squared` can have a better cell than the best cell so
   // far. `low` is the cube's low corner, the cell with the cube's lowest Morton code.
   bool may_improve(const Position& low, uint64_t squared) const {
     if (squared != best_.squared_distance) return squared < best_.squared_distance;

@@ -96,7 +96,7 @@ PackageFolder::PackageFolder(FileSystem& files, const std::string& path)
 
 void PackageFolder::publish(const PackageIndex& index) {
   files_.sync_directory(new_files());
-  refuse_other_folder(files_, path_);  // another program may have created it since
+  refuse_other_folder(files_, path_);  // another program can have created it since
   if (files_.exists(path_) && !files_.list(path_).empty()) {
     update(index);
   } else {

@@ -88,7 +88,7 @@ class TileBuilder {
   std::vector<uint32_t> build(const std::vector<std::string>& masks,
                               const std::vector<Leaf>& leaves) const {
     std::vector<Leaf> distinct_leaves;
-    std::vector<uint32_t> children;  // by edge from the level above: index of the child
+    std::vector<uint32_t> children;  // for each child of the level above: index of the child
     for (const Leaf& leaf : leaves) children.push_back(index_in(distinct_leaves, leaf));
     std::vector<std::vector<ExpandedNode>> nodes(levels_);
     for (uint32_t level = levels_; level-- > 0;) {

@@ -62,7 +62,7 @@ VOXDAG_INLINE FourPlanes<Four> min(FourPlanes<Four> x, FourPlanes<Four> y) {
 // Returns the children that a ray crosses between t_min and t_max. `in` and `out` are the ray's
 // parameters at the planes at which it enters and leaves the children. To test many rays together,
 // pass bounds of their parameters: lower bounds of `in` with upper bounds of `out` give all
-// children that any ray may cross, and the opposite bounds give the children that all rays cross.
+// children that some ray can cross, and the opposite bounds give the children that all rays cross.
 template <class Four>
 VOXDAG_INLINE Crossed cross(FourPlanes<Four> in, FourPlanes<Four> out, double t_min, double t_max) {
   const Four first = Four::of(t_min), last = Four::of(t_max);

@@ -18,7 +18,7 @@ inline constexpr int kPacketRays = 64;
 // A position in voxels, mirrored like the rays. The fourth number has no meaning.
 using Int4 = int32_t __attribute__((vector_size(16)));
 
-// A node or brick that a ray may cross. Each ray has a linked list of such cells. It enters a cell
+// A node or brick that a ray can cross. Each ray has a linked list of such cells. It enters a cell
 // after it has left all earlier cells of the list without a hit.
 struct WaitingCell {
   Int4 low;         // low corner
@@ -75,7 +75,7 @@ struct PacketJob {
 
   // Rays that descend separately are collected and then advanced together in a round. A round
   // begins when this number of cells is loading or waiting: the number of cells that memory can
-  // load concurrently (measured). Up to one more cell per ray may be added before the round begins.
+  // load concurrently (measured). Up to one more cell per ray can be added before the round begins.
   static constexpr int kRoundCells = 24, kMaxWaiting = kRoundCells + kPacketRays;
   WaitingCell waiting[kMaxWaiting];
   RayDescent descents[kPacketRays];

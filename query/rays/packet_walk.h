@@ -2,7 +2,7 @@
 // doubles. Each source file that includes this header is compiled for a different instruction set,
 // so all functions of this header have internal linkage (four_planes.h).
 //
-// The walk visits large cells depth first, once for all rays that may cross them. Bounds of the
+// The walk visits large cells depth first, once for all rays that can cross them. Bounds of the
 // origins and directions of all rays exclude most children. If several children remain, each ray is
 // tested with each of them. If only few rays remain in a cell, each ray descends separately through
 // its cells, nearest first, and so never loads a cell behind its hit. The separate rays take turns,
@@ -181,7 +181,7 @@ class PacketWalk {
                  job_.t_min, job_.t_max);
   }
 
-  // Returns the children of a cell that at least one ray may cross or touch. Computes bounds of the
+  // Returns the children of a cell that at least one ray can cross or touch. Computes bounds of the
   // ray parameters from the bounds of origins and inverse directions. These bounds are valid in
   // spite of rounding, because rounding is monotonic.
   VOXDAG_INLINE uint32_t cross_any(Int4 low, double half) const {

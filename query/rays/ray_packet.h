@@ -1,5 +1,5 @@
 // Casts up to 64 rays together, with results that are bit-identical to RayCaster's. Neighboring
-// rays visit the same large cells. A packet visits each large cell only once, for all rays that may
+// rays visit the same large cells. A packet visits each large cell only once, for all rays that can
 // cross it (query/rays/packet_walk.h).
 //
 // A packet takes about 30 KiB. Not thread-safe; each thread needs its own.

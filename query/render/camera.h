@@ -36,7 +36,7 @@ class Camera {
 
 // Returns a placement from which `points` are centered in the picture and as large as possible. The
 // camera is in the direction `toward_eye` (of any length) from the points. `aspect` is the
-// picture's width divided by its height. A few outliers among thousands of points may be outside
+// picture's width divided by its height. A few outliers among thousands of points can be outside
 // the picture. `points` must not be empty.
 Placement fit_camera(const std::vector<Vec>& points, const Vec& toward_eye, double fov_degrees,
                      double aspect);

@@ -93,7 +93,7 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   // Moves the start away from the surface by more than the steps between neighboring cells of a
   // slope, so that these cells do not occlude it.
   s.start = ray.at(s.t) + s.normal * (s.size * 2.2 * (1 - cube)) + face * (s.size * 0.01);
-  // In a narrow place, the start may be in an occupied cell. Then the start is replaced by the
+  // In a narrow place, the start can be in an occupied cell. Then the start is replaced by the
   // point on the ray 1.5 cells before the hit. That point is free unless the camera is in an
   // occupied cell or closer than 1.5 cells to the hit.
   if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))

@@ -2,7 +2,7 @@
 // visible data (docs/format.md, "Color pages"). A page is addressed by its position. It cannot be
 // addressed by its node, as tiles are, because equal subtrees can have different colors.
 //
-// The address may come from an unknown client, and the colors may come from a damaged file. So the
+// The address can come from an unknown client, and the colors can come from a damaged file. So the
 // work for a page is bounded.
 #pragma once
 

@@ -4,7 +4,7 @@
 // of its last level: the node's offset, which is the address of a further tile, and a coarse brick,
 // which the viewer draws until that tile arrives.
 //
-// Stateless; thread-safe. Offsets may come from unknown clients and damaged files. So each offset
+// Stateless; thread-safe. Offsets can come from unknown clients and damaged files. So each offset
 // is checked, and the tile's number of levels bounds the work for the tile.
 #pragma once
 

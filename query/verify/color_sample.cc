@@ -26,7 +26,7 @@ struct SampledRegion {
   // attributes that the file does not have are unused.
   std::array<ColorRegion, std::size(kAttributeTable)> stored;
   Cube cube;
-  std::vector<FixedSurface> surfaces;  // surfaces that may touch the region
+  std::vector<FixedSurface> surfaces;  // surfaces that can touch the region
 };
 
 size_t index_of(Attribute attribute) { return static_cast<size_t>(attribute) - 1; }
@@ -79,7 +79,7 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
     const CellBox box(surface.position, grid.levels, grid.region_level());
     for (SampledRegion& region : regions) {
       if (!may_touch(box, region.cube)) continue;
-      bytes += 2 * sizeof(FixedSurface);  // a vector may have twice the capacity that it needs
+      bytes += 2 * sizeof(FixedSurface);  // a vector can have twice the capacity that it needs
       if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
         throw Error(ErrorCode::kOutOfMemory,
                     "out of memory: the triangles of the sampled color regions need over " +

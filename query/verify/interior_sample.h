@@ -12,7 +12,7 @@
 // Voxels outside the grid are empty.
 //
 // - A voxel that is not set must be in an empty cube, because the walks have reached it.
-// - A set voxel may be next to an empty cube, which would contain the voxel after one step. Then
+// - A set voxel can be next to an empty cube, which would contain the voxel after one step. Then
 //   something must stop this step: a triangle must touch one of the set voxels that the cube would
 //   move over. Without a radius, this is the voxel itself.
 #pragma once

@@ -219,8 +219,8 @@ std::vector<SampleBox> sample_surface(TriangleSource& scene, const Grid& grid, u
   Random random(seed);
   std::vector<SampleBox> boxes;
   for (const FixedTriangle& triangle : draw_triangles(snapped, random)) {
-    // Maximum number of random points per triangle. The first ones may be outside the grid, because
-    // a triangle may be mostly outside the grid.
+    // Maximum number of random points per triangle. The first ones can be outside the grid, because
+    // a triangle can be mostly outside the grid.
     constexpr int kTries = 16;
     std::optional<std::array<int64_t, 3>> voxel;
     for (int i = 0; i < kTries && !voxel; ++i) voxel = random_voxel(triangle, grid, random);

@@ -138,7 +138,7 @@ Rgb ColorPalette::mean_of(const Bin& bin) {
   return {channel(0), channel(1), channel(2)};
 }
 
-// Gives each bin the palette color that is nearest to the bin. This color may be the mean of a box
+// Gives each bin the palette color that is nearest to the bin. This color can be the mean of a box
 // that does not contain the bin. If several colors are equally near, the first one is used.
 void ColorPalette::assign_bins() {
   std::vector<Lab> labs;

@@ -3,12 +3,12 @@
 //
 // Up to 255 distinct colors are kept unchanged. Otherwise colors with the same six high bits per
 // channel are treated as one color, called a bin. The bins, as points in Oklab (Ottosson 2020), are
-// divided into 255 boxes; the mean of a box is a color of the palette. Each step divides the box
-// with the largest spread: the sum of squared distances from the box's mean along one axis, for the
-// axis where this sum is largest. It divides this box at the mean, because a division at the
-// median, as in Heckbert's method, makes the picture 0.3 to 0.6 dB worse. All arithmetic is in
-// integers, or in IEEE operations in a fixed order. So the palette depends only on how often each
-// color occurs.
+// divided into 255 boxes, and the mean of each box is a color of the palette. The spread of a box
+// is the sum of squared distances from the box's mean along an axis. It is computed for the axis
+// where this sum is largest. Each step divides the box with the largest spread at its mean on this
+// axis. A division at the median, as in Heckbert's method, makes the picture 0.3 to 0.6 dB worse.
+// All arithmetic is in integers, or in IEEE operations in a fixed order. So the palette depends
+// only on how often each color occurs.
 //
 // The used memory does not grow with the number of colors; it is charged to the budget. A palette
 // must be used by only one thread.

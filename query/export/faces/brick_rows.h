@@ -22,7 +22,8 @@
 namespace voxdag::query {
 
 // A brick. The key has its position in bricks: slab, v and u, with 19 bits each, highest first. The
-// two lowest bits of the key mark bricks without faces in one direction.
+// two lowest bits of the key are flags: the brick has no faces toward lower coordinates on the axis
+// of the slabs, or none toward higher coordinates.
 struct RowBrick {
   static constexpr int kCoordinateBits = 19;
   static constexpr int kFlagBits = 2;

@@ -63,9 +63,10 @@ int square_of_gap(int64_t d) {
   return gap * gap;
 }
 
-// Replaces each number by the minimum, over the steps d from -width to width, of the sum of
-// square_of_gap(d) and the number d steps away. The numbers are `outer` blocks of (8 + 2 width)
-// rows of `row` numbers; a step is one row. The result has 8 rows for each block.
+// Computes the part of (2 distance)^2 along one axis. `from` has `outer` blocks of (8 + 2 width)
+// rows of `row` numbers, and a step along the axis is one row. `to` has the 8 middle rows of each
+// block. Each number in `to` is the minimum, for all d from -width to width, of square_of_gap(d)
+// plus the number in `from` that is d rows away.
 void min_along(const std::vector<uint16_t>& from, size_t outer, size_t row, int width,
                std::vector<uint16_t>& to) {
   const auto rows = static_cast<size_t>(kBandLeafEdge + 2 * width);

@@ -42,11 +42,13 @@ class Surface {
   const GrowingBuffer<SurfaceRectangle>& rectangles() const { return rectangles_; }
 
  private:
+  // Adjacent faces of one color in a row of faces, from u0 to u1.
   struct Run {
     uint32_t u0, u1;  // in cells of the grid
     voxdag_reader::Rgb color;
   };
-  // The last row of a plane, as indices of its rectangles in rectangles_.
+  // The rectangles of a plane that extend to row `v`, the last visited row of faces with
+  // rectangles. They are indices into rectangles_.
   struct PlaneRow {
     int64_t v = -2;
     std::vector<size_t> rectangles;

@@ -27,7 +27,7 @@ class FileBuffer : public std::streambuf {
 
  protected:
   std::streamsize xsputn(const char* bytes, std::streamsize count) override {
-    // A single call may pass a complete grid. Writes it in pieces, and checks for cancellation and
+    // A single call can pass a complete grid. Writes it in pieces, and checks for cancellation and
     // reports progress after each.
     constexpr size_t kPieceBytes = 1 << 20;
     const bool done = attempt([&] {
