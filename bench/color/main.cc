@@ -1,10 +1,10 @@
-// Measures the CPU time that colors cost: the rule and the encoding, on one core.
+// Measures the CPU time for computing colors by the color rule and for encoding them, on one core.
 //
 //     bench_color [K]
 //
 // The scene is a generated wavy, tilted sphere with an image of 1024^2 texels, in a color grid of
-// K^3 cells (default 1024). It is baked region by region as in a build. Prints nanoseconds of CPU
-// time per colored cell, the minimum of three runs.
+// K^3 cells (default 1024). Its colors are computed region by region, as in a build. Prints
+// nanoseconds of CPU time per colored cell, the minimum of three runs.
 #include <algorithm>
 #include <array>
 #include <chrono>

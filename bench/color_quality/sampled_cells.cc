@@ -6,7 +6,7 @@
 namespace voxdag {
 namespace {
 
-// The finalizer of SplitMix64.
+// Returns a hash of the code: the finalizer of the random number generator SplitMix64.
 uint64_t hash_of(uint64_t code) {
   code += 0x9e3779b97f4a7c15u;
   code = (code ^ code >> 30) * 0xbf58476d1ce4e5b9u;

@@ -62,7 +62,7 @@ class NeededTiles {
   // Records the tiles that contain the children of the cell at `level` on the current path: one
   // tile for each maximum number of levels per tile.
   void mark(uint32_t level) {
-    if (level < 2) return;  // the first tile has these children
+    if (level < 2) return;  // the root's tile contains these children
     const uint32_t bricks = dag_.grid_levels() - 2;
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
       // The tile above a tile contains the cells down to two levels below the lower tile's root. So

@@ -53,7 +53,7 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
                     std::to_string(b.hash_bits()));
   refuse_attributes(b, kNoAttributes);
   refuse_other_order(a);
-  if (!is_moved) refuse_other_order(b);  // a moved file is sorted again
+  if (!is_moved) refuse_other_order(b);  // move_file() sorts the nodes by hash
 }
 
 // The temporary folder of one combine() or cut(), its memory budget, and the budget's shares.
@@ -203,8 +203,8 @@ class Combination {
 std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
                                                const voxdag_reader::File& b, Workspace& work,
                                                Progress& progress, const CancelToken& cancel) {
-  // Limits the offset to prevent overflow. At this distance, all voxels of `b` are already outside
-  // the grid of `a`.
+  // Limits the offset to prevent overflow. With an offset of kFar, all voxels of `b` are already
+  // outside the grid of `a`.
   constexpr int64_t kFar = int64_t{1} << (kMaxGridLevels + 1);
   std::array<int64_t, 3> offset = *work.spec.offset;
   for (int64_t& distance : offset) distance = std::clamp(distance, -kFar, kFar);

@@ -43,7 +43,8 @@ class Join {
   Join(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory& memory);
   ~Join();
 
-  // Joins one level, and fills `joined`. Call it for each level, from the bricks up.
+  // Hashes the nodes of one level of both files and finds the equal nodes. Stores the results in
+  // `joined`. Call it for each level, from the bricks up.
   void add_level(uint32_t level, JoinedLevel& joined);
 
  private:

@@ -22,7 +22,7 @@ namespace voxdag::query {
 // A node or a brick while levels are combined. Rows are compared in the total order of
 // docs/format.md.
 struct Row {
-  uint64_t hash = 0;          // truncated
+  uint64_t hash = 0;          // truncated to the hash bits of the file
   uint32_t mask = 0;          // child mask; 0 for a brick
   uint32_t count = 0;         // number of children; 1 for a brick
   uint64_t children[8] = {};  // word offsets; for a brick, children[0] is its mask

@@ -22,7 +22,7 @@ namespace {
 constexpr uint64_t kMaxHashDagWords = uint64_t{1} << 32;  // word indices have 32 bits
 constexpr uint64_t kMaxHashDagColors = (uint64_t{1} << 32) - 1;
 constexpr uint64_t kMaxCount = uint64_t{1} << 24;  // smaller counts fit above the child mask
-constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R
+constexpr uint32_t kGray = 0xffb0b0b0;             // A, B, G, R, from the highest byte down
 constexpr uint64_t kHashDagHeaderBytes = 6 * sizeof(double) + sizeof(uint32_t) + sizeof(uint64_t);
 
 // Returns the number of top levels, whose voxel counts are in the color file. A node of level L - 7

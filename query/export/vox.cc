@@ -348,8 +348,8 @@ ExportReport write_vox(const ExportJob& job) {
   VoxWriter writer(job, dag);
   const uint64_t bytes = writer.bytes();
   if (bytes > kMaxVoxBytes || writer.instance_count() > kMaxVoxModels) {
-    // Suggests coarser grids that fit even if no models are shared. A voxel takes 4 bytes. Voxels
-    // may use three fourths of kMaxVoxBytes; the last fourth is for models and instances.
+    // Suggests coarser grids that fit even if no models are shared. A voxel takes 4 bytes. Three
+    // fourths of kMaxVoxBytes are for voxels, and the last fourth is for models and instances.
     CellLimit cells(job, kMaxVoxBytes / 16 * 3);
     refuse_size(job,
                 size_text(bytes) + " or more are needed" +

@@ -45,7 +45,7 @@ class VoxelWriter {
     dag_.for_each_brick([&](uint64_t offset, uint64_t mask) {
       below[offset] = mask == kFullBrick ? kSolid : leaves_++;
     });
-    bin_.put(uint32_t{0});  // space for the root's word, which is known last
+    bin_.put(uint32_t{0});  // space for the root's word, which is known only at the end
     for (uint32_t level = dag_.brick_level(); level-- > 0;) {
       NodeNumbers<uint32_t> words(job_, dag_, level);
       dag_.for_each_node(level,

@@ -23,7 +23,7 @@ namespace voxdag::query {
 // Albedo of a surface without a color, linear.
 inline constexpr Vec kPlaster{{0.74, 0.70, 0.64}};
 
-// The file must outlive the object. Not thread-safe.
+// Returns the colors of a file as albedo. The file must outlive the object. Not thread-safe.
 class Albedo {
  public:
   // `colors`: the file whose colors are shown. If it is null or has no colors, all surfaces are

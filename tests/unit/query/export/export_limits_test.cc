@@ -68,7 +68,7 @@ class ExportLimits : public ::testing::Test {
 
   static constexpr uint64_t kMemory = 64 << 20;
   TemporaryFolder folder_;
-  ExportOptions options_;  // of refused exports
+  ExportOptions options_;  // for the exports of refusal()
 };
 
 // If the export of a region is refused, the message names a coarser level that fits, and the region

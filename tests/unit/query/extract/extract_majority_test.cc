@@ -10,7 +10,8 @@
 namespace voxdag::query {
 namespace {
 
-// Returns the cells of the grid of 2^levels cells per edge with at least half of their voxels.
+// Returns the cells of the grid of 2^levels cells per edge in which at least half of the voxels are
+// set.
 oracle::Voxels majority_of(const oracle::Voxels& voxels, uint32_t levels) {
   const int edge = 1 << levels, size = voxels.edge() >> levels;
   std::vector<int> counts(static_cast<size_t>(edge) * edge * edge);
