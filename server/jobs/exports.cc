@@ -208,7 +208,7 @@ Exports::Added Exports::add(const std::string& job, const std::string& request,
   if (!files_.exists(JobFolder{jobs_path_ + "/" + job}.result()))
     throw RequestError(RequestError::Kind::kConflict,
                        "the result of the job is missing, because its deletion has begun");
-  Entry entry;
+  Export it;
   Entry* known = nullptr;
   size_t queued = 0;
   for (auto& [other_job, entries] : jobs_)
@@ -232,27 +232,29 @@ Exports::Added Exports::add(const std::string& job, const std::string& request,
         RequestError::Kind::kBusy,
         "too many exports are queued: expected less than " + std::to_string(kMaxQueuedExports));
   if (known) {
-    entry.it = known->it;
+    it = known->it;
   } else {
-    entry.it.id = random_id();
-    entry.it.job = job;
-    entry.it.request = request;
-    entry.it.output = output;
-    entry.it.created_s = unix_seconds();
+    it.id = random_id();
+    it.job = job;
+    it.request = request;
+    it.output = output;
+    it.created_s = unix_seconds();
   }
-  queue_again(entry.it);
-  entry.it.interruptions = 0;
-  files_.make_directories(folder(entry.it));
+  queue_again(it);
+  it.interruptions = 0;
+  files_.make_directories(folder(it));
   try {
-    write_record(entry.it);
+    write_record(it);
   } catch (...) {
-    if (!known) steps_.run("remove an export", [&] { remove_folder(entry.it); });
+    if (!known) steps_.run("remove an export", [&] { remove_folder(it); });
     throw;
   }
+  // An export that has just failed can still be busy. It remains so until its files are removed.
+  Entry& entry = known ? *known : jobs_[job][it.id];
+  entry.it = it;
   entry.turn = next_turn_++;
-  jobs_[job][entry.it.id] = entry;
   changed_.notify_all();
-  return {entry.it, true};
+  return {it, true};
 }
 
 std::vector<Export> Exports::list(const std::string& job) const {
