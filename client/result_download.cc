@@ -13,20 +13,21 @@ constexpr size_t kDigitsInPartialName = 12;
 
 class Download {
  public:
-  Download(ServiceClient& service, FileSystem& files, const Json& job, const std::string& output,
-           Progress& progress)
+  Download(ServiceClient& service, FileSystem& files, const RemoteFile& file,
+           const std::string& output, Progress& progress)
       : service_(service),
         files_(files),
         progress_(progress),
-        path_(job_path(job.at("id")) + "/dag"),
+        path_(file.path),
         output_(output),
-        sha256_(job.at("result").at("sha256")),
-        size_(job.at("result").at("bytes")),
+        sha256_(file.sha256),
+        size_(file.bytes),
         partial_(output + "." + sha256_.substr(0, kDigitsInPartialName) + ".partial") {}
 
   DownloadResult run() {
     files_.make_directories(parent_directory(output_));
     const uint64_t resumed_bytes = bytes_present();
+    if (size_ == 0) files_.create(partial_)->close();
     for (RetryPolicy retry(service_.cancel()); bytes_present() < size_;) {
       const uint64_t before = bytes_present();
       std::string reason = "server " + service_.url() + ": the download ended after " +
@@ -125,13 +126,21 @@ class Download {
 
 }  // namespace
 
+DownloadResult download_file(ServiceClient& service, FileSystem& files, const RemoteFile& file,
+                             const std::string& output, Progress& progress) {
+  return Download(service, files, file, output, progress).run();
+}
+
 DownloadResult download_result(ServiceClient& service, FileSystem& files, const Json& job,
                                const std::string& output, Progress& progress) {
   if (job.at("state") != "succeeded")
     throw Error(ErrorCode::kNotFound, "job " + job.at("id").get<std::string>() + " is " +
                                           job.at("state").get<std::string>() +
                                           ": expected a succeeded job");
-  return Download(service, files, job, output, progress).run();
+  const Json& result = job.at("result");
+  return download_file(service, files,
+                       {job_path(job.at("id")) + "/dag", result.at("bytes"), result.at("sha256")},
+                       output, progress);
 }
 
 }  // namespace voxdag::client

@@ -185,6 +185,33 @@ TEST_F(Client, ResumesADownload) {
   EXPECT_TRUE(contents("got.vdag") == whole);
 }
 
+// `download --to` lets the server export the result. The files have the bytes of local exports.
+TEST_F(Client, DownloadsExports) {
+  const std::string id = run_json({"submit", "m.glb", "-r", "64", "--wait"}).at("id");
+  ASSERT_EQ(run({"download", id, "-o", "m.vdag"}).status, 0);
+  const Json report = run_json({"download", id, "--to", "npz", "--level", "5", "--region",
+                                "0,0,0,16,16,16", "--compact", "-o", "got.npz"});
+  EXPECT_EQ(report["files"][0]["output"], "got.npz");
+  ASSERT_EQ(run({"export", "m.vdag", "--to", "npz", "--level", "5", "--region", "0,0,0,16,16,16",
+                 "--compact", "-o", "local.npz"})
+                .status,
+            0);
+  EXPECT_TRUE(contents("got.npz") == contents("local.npz"));
+  ASSERT_EQ(run({"download", id, "--to", "hashdag", "-o", "got.basic_dag.dag.bin"}).status, 0);
+  ASSERT_EQ(run({"export", "m.vdag", "--to", "hashdag", "-o", "local.basic_dag.dag.bin"}).status,
+            0);
+  for (const char* suffix : {".basic_dag.dag.bin", ".basic_dag.uncompressed_colors.bin"})
+    EXPECT_TRUE(contents("got" + std::string(suffix)) == contents("local" + std::string(suffix)));
+  ASSERT_EQ(run({"download", id, "--to", "vdag", "--level", "4", "-o", "coarse.vdag"}).status, 0);
+  ASSERT_EQ(run({"extract", "m.vdag", "--level", "4", "-o", "local.vdag"}).status, 0);
+  EXPECT_TRUE(contents("coarse.vdag") == contents("local.vdag"));
+
+  expect_error(2, "--to FORMAT", {"download", id, "--level", "5", "-o", "x.vdag"});
+  expect_error(2, "expected one of vdag", {"download", id, "--to", "fbx", "-o", "x.fbx"});
+  expect_error(2, "--force", {"download", id, "--to", "ply", "-o", "m.glb"});
+  expect_error(2, "--up", {"download", id, "--to", "ply", "--up", "x", "-o", "x.ply"});
+}
+
 // Jobs that wait in the queue behind a long job can be suspended, canceled and resumed.
 TEST_F(Client, SuspendsCancelsAndResumes) {
   const std::string first = submit_long();
