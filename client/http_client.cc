@@ -58,7 +58,9 @@ struct HttpClient::Impl {
                                                 "' is not a valid address: expected "
                                                 "http://HOST:PORT or https://HOST[:PORT]");
     const auto timeout = std::chrono::microseconds(static_cast<int64_t>(options.timeout_s * 1e6));
-    http.set_connection_timeout(timeout);
+    const double connect_s =
+        options.connect_timeout_s > 0 ? options.connect_timeout_s : options.timeout_s;
+    http.set_connection_timeout(std::chrono::microseconds(static_cast<int64_t>(connect_s * 1e6)));
     http.set_read_timeout(timeout);
     http.set_write_timeout(timeout);
     http.set_keep_alive(true);
@@ -94,8 +96,10 @@ ClientResponse HttpClient::head(const std::string& path, const HeaderMap& header
   return impl_->check(impl_->http.Head(path, to_httplib(headers)));
 }
 
-ClientResponse HttpClient::send(const std::string& method, const std::string& path,
-                                const std::string& body, const HeaderMap& headers) {
+namespace {
+
+httplib::Request request_of(const std::string& method, const std::string& path,
+                            const std::string& body, const HeaderMap& headers) {
   httplib::Request request;
   request.method = method;
   request.path = path;
@@ -103,8 +107,29 @@ ClientResponse HttpClient::send(const std::string& method, const std::string& pa
   request.body = body;
   if (!body.empty() && !request.has_header("Content-Type"))
     request.set_header("Content-Type", "application/json");
-  return impl_->check(impl_->http.send(request));
+  return request;
 }
+
+}  // namespace
+
+ClientResponse HttpClient::send(const std::string& method, const std::string& path,
+                                const std::string& body, const HeaderMap& headers) {
+  return impl_->check(impl_->http.send(request_of(method, path, body, headers)));
+}
+
+int HttpClient::send_for_status(const std::string& method, const std::string& path,
+                                const std::string& body, const HeaderMap& headers) {
+  httplib::Request request = request_of(method, path, body, headers);
+  int status = 0;
+  request.response_handler = [&](const httplib::Response& response) {
+    status = response.status;
+    return false;  // closes the connection
+  };
+  const auto result = impl_->http.send(request);
+  return status != 0 ? status : impl_->check(result).status;
+}
+
+void HttpClient::stop() { impl_->http.stop(); }
 
 ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
                                   const HeaderMap& headers) {
@@ -159,6 +184,14 @@ ClientResponse HttpClient::stream(const std::string& path, const HeaderMap& head
   if (!closed) head = impl_->check(result);
   if (!error_body.empty()) head.body = error_body;
   return head;
+}
+
+bool supports_https() {
+#ifdef CPPHTTPLIB_OPENSSL_SUPPORT
+  return true;
+#else
+  return false;
+#endif
 }
 
 ErrorCode error_code_of(const std::string& name, int http_status) {

@@ -26,10 +26,11 @@ struct ClientResponse {
 };
 
 struct ClientOptions {
-  std::string url;        // http://host:port or https://host[:port], without a path
-  std::string token;      // "": no token
-  std::string ca_file;    // file of certificates to trust; "": the system's certificates
-  double timeout_s = 30;  // limit for connecting, and for each read and write
+  std::string url;               // http://host:port or https://host[:port], without a path
+  std::string token;             // "": no token
+  std::string ca_file;           // file of certificates to trust; "": the system's certificates
+  double timeout_s = 30;         // limit for connecting, and for each read and write
+  double connect_timeout_s = 0;  // another limit for connecting; 0: timeout_s
 };
 
 // The constructor throws Error{kInvalidInput} for a malformed URL. Requests throw Error{kIo} if the
@@ -46,6 +47,16 @@ class HttpClient {
   // not empty is sent as application/json, unless `headers` has a Content-Type.
   ClientResponse send(const std::string& method, const std::string& path, const std::string& body,
                       const HeaderMap& headers = {});
+
+  // Sends a request like send() and returns the status of the answer. Closes the connection before
+  // the body of the answer arrives, so the answer may have any size.
+  int send_for_status(const std::string& method, const std::string& path, const std::string& body,
+                      const HeaderMap& headers = {});
+
+  // Closes the connection of a request in progress, which then throws Error{kIo}. Any thread may
+  // call it. It has no effect while no connection is open, so callers repeat it until the request
+  // ends. While a connection is being opened, the call waits.
+  void stop();
 
   // Sends `size` bytes with PUT. source(offset, max_bytes) must return the bytes from `offset` on:
   // at least one and at most max_bytes.
@@ -67,6 +78,8 @@ class HttpClient {
   std::unique_ptr<Impl> impl_;
 };
 
+// True if this build can use https://.
+bool supports_https();
 // Returns the error code named `name` in docs/errors.md. If there is no such code, returns kIo for
 // an HTTP status of 500 or above, and kInvalidInput for a lower status.
 ErrorCode error_code_of(const std::string& name, int http_status);

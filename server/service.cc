@@ -84,9 +84,11 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
       http_(
           config_.http, [this](Request& request) { return answer(request); },
           [this](int status) { metrics_.count_request(status, 0); }),
+      webhooks_(config_, files, queue_, log_),
       dispatcher_(config_, files, queue_, tasks_, disk_, log_,
                   [this](const Job& job) { metrics_.count_run(job); }),
-      context_{config_, files, queue_, scenes_, tasks_, disk_, dispatcher_, metrics_, draining_} {
+      context_{config_, files,       queue_,    scenes_,  tasks_,
+               disk_,   dispatcher_, webhooks_, metrics_, draining_} {
   if (!config_.token_file.empty() && config_.http.certificate_file.empty() &&
       !is_loopback_name(config_.http.address))
     log_("warning: tokens travel in plain text: " + url() +
@@ -116,6 +118,7 @@ void Service::run() {
   std::thread cleaner([this] {
     clean_up_periodically();
     dispatcher_.stop();
+    webhooks_.stop();
   });
   std::exception_ptr failure;
   try {

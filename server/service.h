@@ -12,6 +12,7 @@
 #include "server/api/routing/router.h"
 #include "server/base/clock_guard.h"
 #include "server/http/http_server.h"
+#include "server/webhooks/webhooks.h"
 
 namespace voxdag::server {
 
@@ -52,6 +53,7 @@ class Service {
   ClockGuard clock_;  // for the retention of uploads
   TaskResolver tasks_;
   HttpServer http_;
+  Webhooks webhooks_;
   Dispatcher dispatcher_;
   Context context_;
   Router router_{context_};

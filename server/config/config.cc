@@ -5,12 +5,15 @@
 #include "core/base/text.h"
 #include "core/fields/json_fields.h"
 #include "scheduler/cluster/cluster.h"
+#include "server/base/http_url.h"
 #include "server/http/connection/listener.h"
 
 namespace voxdag::server {
 namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
+constexpr size_t kMaxWebhookPrefixes = 64;
+constexpr double kMaxWebhookTimeoutS = 300;
 constexpr const char* kExpectedOrigin =
     "expected an origin, such as https://lab.example.org or http://localhost:8888";
 
@@ -22,6 +25,27 @@ bool is_origin(const std::string& text) {
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-:[]";
   return host > 0 && host < text.size() &&
          text.find_first_not_of(kAllowed, host) == std::string::npos;
+}
+
+void check_webhooks(const WebhookOptions& webhooks) {
+  const auto expect = [](bool holds, const std::string& what) {
+    if (!holds) throw Error(ErrorCode::kInvalidInput, what);
+  };
+  expect(webhooks.allow.size() <= kMaxWebhookPrefixes,
+         "webhooks.allow has " + std::to_string(webhooks.allow.size()) +
+             " items: expected at most " + std::to_string(kMaxWebhookPrefixes));
+  for (const std::string& prefix : webhooks.allow) {
+    const std::string place = "webhooks.allow: '" + prefix + "': ";
+    expect(prefix.find('?') == std::string::npos, place + "expected a URL without a query");
+    try {
+      parse_http_url(prefix);
+    } catch (const Error& error) {
+      throw Error(error.code(), place + error.message());
+    }
+  }
+  expect(webhooks.timeout_s <= kMaxWebhookTimeoutS,
+         "webhooks.timeout_s is " + number_text(webhooks.timeout_s) + ": expected at most " +
+             number_text(kMaxWebhookTimeoutS));
 }
 
 }  // namespace
@@ -68,6 +92,16 @@ void fields(Visitor& visit, Retention& retention) {
 }
 
 template <class Visitor>
+void fields(Visitor& visit, WebhookOptions& webhooks) {
+  visit("allow", webhooks.allow);
+  visit("secret_file", webhooks.secret_file);
+  visit(Field("max_attempts").range(1, 100), webhooks.max_attempts);
+  visit(Field("backoff_s").at_least(0), webhooks.backoff_s);
+  visit(Field("max_backoff_s").at_least(0), webhooks.max_backoff_s);
+  visit(Field("timeout_s").above_zero(), webhooks.timeout_s);
+}
+
+template <class Visitor>
 void fields(Visitor& visit, ServerConfig& c) {
   visit("address", c.http.address);
   visit("port", c.http.port);
@@ -106,6 +140,7 @@ void fields(Visitor& visit, ServerConfig& c) {
     connections(Field("min_bytes_per_s").at_least(0), c.http.limits.min_bytes_per_s);
   });
   visit("retention", c.retention);
+  visit("webhooks", c.webhooks);
 }
 
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config) {
@@ -156,6 +191,7 @@ void check_config(const ServerConfig& config) {
   expect(config.jobs.cache_bytes == 0 || config.cluster.engine == ClusterEngine::kNone,
          "jobs.cache is " + size_text(config.jobs.cache_bytes) +
              ": expected no cache with cluster.engine, because builds of a cluster do not use it");
+  check_webhooks(config.webhooks);
   for (const std::string& root : config.scene_roots)
     expect(root.starts_with('/'),
            "scene_roots: '" + root +

@@ -54,6 +54,15 @@ struct Retention {
   double upload_days = 2;          // retention of unfinished uploads
 };
 
+struct WebhookOptions {
+  std::vector<std::string> allow;  // prefixes of the URLs that jobs may name
+  std::string secret_file;         // file with the key of signatures; "": no signatures
+  unsigned max_attempts = 10;
+  double backoff_s = 10;  // pause before the second attempt; doubles with each further attempt
+  double max_backoff_s = 3600;
+  double timeout_s = 10;  // per attempt
+};
+
 struct ServerConfig {
   HttpOptions http;
   std::string data_folder;
@@ -73,6 +82,7 @@ struct ServerConfig {
   ClusterOptions cluster;
   TransferLimits transfers;
   Retention retention;
+  WebhookOptions webhooks;
   bool adopt = false;          // jobs and scenes without records get new records
   StepHook before_step;        // used by tests
   double drain_timeout_s = 5;  // time for requests in progress when the service stops

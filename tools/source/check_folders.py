@@ -35,7 +35,7 @@ PRODUCT_INCLUDES = CORE_INCLUDES | {
     "library": CORE + ["scene", "scheduler"],
     "query": CORE + ["scene", "merge"],
     "client": ["core/base", "core/io", "core/format"],  # core/format: SHA-256
-    "server": CORE + ["scene", "scheduler", "query"],
+    "server": CORE + ["scene", "scheduler", "query", "client"],
     "cli": CORE + ["scene", "scheduler", "query", "client", "server"],
     "python": CORE + ["scene", "scheduler", "query"],
 }
@@ -58,7 +58,10 @@ BEHIND_PUBLIC_HEADERS = ("tests", "bench")
 
 # For some pairs of a folder and a folder that it includes: the only headers that it may include.
 # Other folders may include more headers of that folder.
-PUBLIC_HEADERS_TO = {("scheduler", "query"): ["query/reorder/order_levels.h"]}
+PUBLIC_HEADERS_TO = {
+    ("scheduler", "query"): ["query/reorder/order_levels.h"],
+    ("server", "client"): ["client/http_client.h"],
+}
 
 # Folders with layers of inner folders. An inner folder may include only itself and the inner
 # folders that follow it in the list.
@@ -135,6 +138,7 @@ LAYERS = {
         "server/web",
         "server/tiles/partial",
         "server/tiles",
+        "server/webhooks",
         "server/jobs",
         "server/jobs/process",
         "server/jobs/protocol",

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/api/answers/job_json.h"
 #include "server/base/json_text.h"
+#include "server/base/time_text.h"
 
 namespace voxdag::server {
 namespace {

@@ -1,9 +1,7 @@
 #include "server/api/answers/job_json.h"
 
-#include <cmath>
-
-#include "core/base/text.h"
 #include "server/base/json_text.h"
+#include "server/base/time_text.h"
 #include "server/base/warning_json.h"
 
 namespace voxdag::server {
@@ -60,16 +58,8 @@ std::string or_null(const std::string& json) {
 
 }  // namespace
 
-std::string time_text(double unix_s) {
-  if (unix_s == 0) return "";
-  const auto milliseconds = static_cast<int64_t>(std::floor(unix_s * 1000));
-  char fraction[8];
-  std::snprintf(fraction, sizeof fraction, ".%03dZ", static_cast<int>(milliseconds % 1000));
-  return utc_text(milliseconds / 1000, "%Y-%m-%dT%H:%M:%S") + fraction;
-}
-
-std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
-                     unsigned max_attempts) {
+std::string job_json(const Job& job, const LiveJob* live, uint64_t position, unsigned max_attempts,
+                     const std::string& webhook) {
   const std::string progress = live ? live->progress_json() : "";
   return "{\"id\":\"" + job.id + "\",\"name\":" + as_json(job.name) + ",\"state\":\"" +
          state_name(job.state) + "\"," + request_members(job.request) +
@@ -84,6 +74,7 @@ std::string job_json(const Job& job, const LiveJob* live, uint64_t position,
          ",\"progress\":" + or_null(progress.empty() ? job.progress : progress) +
          ",\"result\":" + or_null(job.result) + ",\"error\":" + error_member(job.error) +
          ",\"warnings\":" + as_json(live ? live->warnings() : job.warnings) +
+         ",\"webhook\":" + webhook +
          ",\"preview\":" + (job.preview == Preview::kReady ? "true" : "false") +
          ",\"links\":" + links("/api/v1/jobs/" + job.id) + "}";
 }

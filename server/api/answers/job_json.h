@@ -10,11 +10,10 @@
 
 namespace voxdag::server {
 
-// Returns the text of a Unix time, such as "2026-11-21T07:00:00.123Z"; "" for the time 0.
-std::string time_text(double unix_s);
-
 // Returns the job as JSON. `live` is null unless the job's process is running. `position` is the
-// position in the queue, counted from 1; 0 if the job is not queued.
-std::string job_json(const Job& job, const LiveJob* live, uint64_t position, unsigned max_attempts);
+// position in the queue, counted from 1; 0 if the job is not queued. `webhook` is the JSON
+// of the member "webhook" (Webhooks::job_member()).
+std::string job_json(const Job& job, const LiveJob* live, uint64_t position, unsigned max_attempts,
+                     const std::string& webhook);
 
 }  // namespace voxdag::server

@@ -17,6 +17,7 @@
 #include "server/scenes/scene_store.h"
 #include "server/tiles/open_tile_sources.h"
 #include "server/tiles/partial/partial_views.h"
+#include "server/webhooks/webhooks.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::server {
@@ -29,6 +30,7 @@ struct Context {
   TaskResolver& tasks;
   DiskSpace& disk;
   Dispatcher& dispatcher;
+  Webhooks& webhooks;
   Metrics& metrics;
   const std::atomic<bool>& draining;  // true once the service has begun to stop
 

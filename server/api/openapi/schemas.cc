@@ -151,6 +151,14 @@ void add_jobs(Json& all) {
        {"levels", array(object({{"level", count()}, {"nodes", count()}, {"bytes", count()}}))}});
   all["JobError"] =
       object({{"code", text()}, {"message", text()}, {"at", time()}, {"transient", boolean()}});
+  all["Webhook"] = object({{"origin", text()},
+                           {"state", one_of({"waiting", "pending", "delivered", "failed"})},
+                           {"delivery", or_null("string")},
+                           {"attempts", count()},
+                           {"status", or_null("integer")},
+                           {"error", or_null("string")},
+                           {"next_attempt_at", time()},
+                           {"ended_at", time()}});
   all["Job"] = object({{"id", pattern("^[0-9a-f]{16}$")},
                        {"name", text()},
                        {"state", state()},
@@ -170,6 +178,7 @@ void add_jobs(Json& all) {
                        {"result", named_or_null("Result")},
                        {"error", named_or_null("JobError")},
                        {"warnings", array(record_schema<Warning>())},
+                       {"webhook", named_or_null("Webhook")},
                        {"preview", boolean()},
                        {"links", map_of(text())}});
   all["JobList"] = object({{"jobs", array(named("Job"))},

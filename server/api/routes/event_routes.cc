@@ -6,6 +6,7 @@
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
+#include "server/base/time_text.h"
 
 namespace voxdag::server {
 namespace {
@@ -96,7 +97,9 @@ void EventFeed::add_changes(std::string& text) {
     last_number_ = event.number;
   }
   const auto live = context_.dispatcher.live(id_);
-  text += event_text("job", job_json(*job, live.get(), 0, context_.config.jobs.max_attempts),
+  text += event_text("job",
+                     job_json(*job, live.get(), 0, context_.config.jobs.max_attempts,
+                              context_.webhooks.job_member(*job)),
                      last_number_);
   if (has_ended(job->state)) {
     text += event_text("end", "{\"state\":\"" + std::string(state_name(job->state)) + "\"}");

@@ -58,7 +58,8 @@ std::string to_json(Context& context, const Job& job) {
     const auto found = positions->find(job.number);
     if (found != positions->end()) position = found->second;
   }
-  return job_json(job, live.get(), position, context.config.jobs.max_attempts);
+  return job_json(job, live.get(), position, context.config.jobs.max_attempts,
+                  context.webhooks.job_member(job));
 }
 
 IdempotencyKey key_of(const Request& request, const JobRequest& job) {
@@ -198,6 +199,7 @@ JobRequest read_job_request(Context& context, Call& call) {
   if (request.text.size() > kMaxRequestBytes)
     throw bad_request("scene, resolution and options have " + std::to_string(request.text.size()) +
                       " bytes as JSON: expected at most " + std::to_string(kMaxRequestBytes));
+  if (!request.webhook.empty()) context.webhooks.check(request.webhook);
   return request;
 }
 

@@ -9,6 +9,7 @@
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
+#include "server/base/time_text.h"
 #include "server/http/message/digest_field.h"
 #include "server/scenes/scene_upload.h"
 

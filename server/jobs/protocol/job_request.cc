@@ -21,6 +21,7 @@ JobRequest parse_job_request(std::string_view body) {
                         {"resolution", request.spec.geometry.resolution},
                         {"options", json.value("options", FieldJson::object())}};
     if (!request.labels.empty()) stored["labels"] = request.labels;
+    if (!request.webhook.empty()) stored["webhook"] = request.webhook;
     request.text = json_text(stored);
     return request;
   });

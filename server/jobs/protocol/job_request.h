@@ -13,10 +13,11 @@ namespace voxdag::server {
 struct JobRequest {
   std::string name;
   std::vector<std::string> labels;  // for searches
+  std::string webhook;              // URL that is notified when the job has ended; "": none
   int priority = 0;
   std::vector<std::string> scenes;  // names of uploads or absolute paths
   BuildSpec spec;                   // without scenes, output and work folder
-  std::string text;                 // JSON with the submitted scene, resolution, options and labels
+  std::string text;  // JSON with the submitted scene, resolution, options, labels, webhook
 };
 
 inline constexpr Field kLabelsField = Field("labels", "texts to find the job by")
@@ -31,6 +32,8 @@ void fields(Visitor& visit, JobRequest& request) {
   visit(kResolutionField, request.spec.geometry.resolution);
   visit(Field("name", "name of the job, for people").line(200).omit_empty(), request.name);
   visit(kLabelsField, request.labels);
+  visit(Field("webhook", "URL to notify when the job has ended").line(1024).omit_empty(),
+        request.webhook);
   visit(kPriorityField, request.priority);
   visit.object("options", [&](auto& options) { visit_job_options(options, request.spec); });
 }

@@ -194,6 +194,7 @@ class JobPage {
                 job.labels.flatMap(
                     (label) =>
                         [h("a", {href: `#/?${new URLSearchParams({q: label})}`}, label), " "])),
+        job.webhook && fact("Webhook", webhookText(job.webhook)),
         fact("Priority", String(job.priority)),
         fact("Attempts", `${job.attempts} of ${job.max_attempts}`),
         fact("Created", ...when(job.created_at)), fact("Started", ...when(job.started_at)),
@@ -223,6 +224,20 @@ class JobPage {
 }
 
 // Returns a box with the job's last error; null without an error or if the job has succeeded since.
+// Returns a text such as "delivered to https://hooks.example.org:443".
+function webhookText({origin, state, attempts, error, next_attempt_at: nextAt}) {
+  const texts = {
+    waiting: "when the job has ended, to",
+    pending: "not yet delivered to",
+    delivered: "delivered to",
+    failed: "could not be delivered to"
+  };
+  const tries =
+      attempts > 1 || error ? ` · ${attempts} ${attempts === 1 ? "attempt" : "attempts"}` : "";
+  return `${texts[state] ?? state} ${origin}${tries}` + (error ? ` · ${error}` : "") +
+      (error && nextAt ? ` · next attempt ${timeText(nextAt)}` : "");
+}
+
 function errorBox(job) {
   if (!job.error || job.state === "succeeded") return null;
   const problem = {code: job.error.code, detail: job.error.message};
