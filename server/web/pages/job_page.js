@@ -15,6 +15,7 @@ import {
 } from "../lib/format.js";
 import {ClusterView} from "../views/cluster_view.js";
 import {CubesView} from "../views/cubes_view.js";
+import {ExportsView} from "../views/exports_view.js";
 import {actions} from "../views/job_actions.js";
 import {LogView} from "../views/log_view.js";
 import {copyButton, problemBox, stateBadge} from "../views/parts.js";
@@ -46,6 +47,7 @@ class JobPage {
     this.cluster = new ClusterView();
     this.rate = new RatePlot(id);
     this.cubes = new CubesView(`${this.path}/subvolumes`, signal);
+    this.exports = new ExportsView(`${this.path}/exports`, signal);
     this.log = new LogView(`${this.path}/log`, signal);
     this.element = h(
         "div", {class: "stack"}, h("p", {class: "crumb"}, h("a", {href: "#/"}, "Jobs"), this.link),
@@ -118,6 +120,7 @@ class JobPage {
     this.log.setLive(!hasEnded(job.state));
     if (job.state === "succeeded") resultView(this.places.result, job, this.signal);
     else clear(this.places.result);
+    this.exports.update(job);
   }
 
   updateProgress(progress) {
@@ -156,6 +159,7 @@ class JobPage {
     clear(
         this.element, this.element.firstChild, this.places.head, this.places.actions,
         this.places.error, this.places.warnings, this.progress.element, this.places.result,
+        this.exports.element,
         this.columns =
             h("div", {class: "two"},
               h("div", {class: "stack"},

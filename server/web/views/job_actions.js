@@ -1,13 +1,12 @@
 // The actions that the state of a job allows.
 
-import {request, sendJson, token} from "../lib/api.js";
+import {sendJson, token} from "../lib/api.js";
 import {clear, confirmAction, h} from "../lib/dom.js";
-import {hasEnded, sizeText, titleText} from "../lib/format.js";
+import {hasEnded, titleText} from "../lib/format.js";
+import {saveFile} from "../lib/save_file.js";
 import {kSceneEnding} from "../lib/scene_upload.js";
 
 import {copyButton, problemBox} from "./parts.js";
-
-const kMaxInMemoryBytes = 2 ** 30;
 
 // Returns the elements for the actions on a job. `reload` is called after each action.
 export function actions(job, reload) {
@@ -24,7 +23,7 @@ export function actions(job, reload) {
   };
   const may = (...states) => states.includes(job.state);
   const buttons = [
-    may("succeeded") && button("Download", () => download(job), "primary"),
+    may("succeeded") && button("Download", () => saveFile(resultFile(job)), "primary"),
     may("succeeded") && viewLink(job),
     may("suspended") && button("Resume", post("resume"), "primary"),
     may("failed", "canceled") && button("Retry", post("retry"), "primary"),
@@ -39,7 +38,7 @@ export function actions(job, reload) {
 
 // Returns a button that is busy while its action runs. If the action throws Problem, the element
 // `error` shows it.
-function actionButton(text, action, kind, error) {
+export function actionButton(text, action, kind, error) {
   const element =
       h("button", {type: "button", class: kind, "data-action": text.toLowerCase()}, text);
   element.addEventListener("click", async () => {
@@ -79,35 +78,8 @@ function fileName(job) {
       titleText(job).replace(kSceneEnding, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
 }
 
-// Downloads the result. Without a token, the browser downloads the link itself and can resume the
-// download. A link cannot carry a token. So with a token, the bytes are streamed to a file if the
-// browser supports this; otherwise they are held in memory.
-async function download(job) {
-  const name = fileName(job);
-  if (!token.get()) return clickLink(job.links.dag, name);
-  if (window.showSaveFilePicker) {
-    const handle = await window.showSaveFilePicker({suggestedName: name}).catch(() => null);
-    if (!handle) return;
-    const response = await request("GET", job.links.dag);
-    await response.body.pipeTo(await handle.createWritable());
-    return;
-  }
-  if (job.result.bytes > kMaxInMemoryBytes)
-    throw {
-      code: "too_large",
-      detail: `This browser cannot save ${
-          sizeText(job.result.bytes)} with a token: use the command under "Result".`
-    };
-  const url = URL.createObjectURL(await (await request("GET", job.links.dag)).blob());
-  clickLink(url, name);
-  setTimeout(() => URL.revokeObjectURL(url), 60000);
-}
-
-function clickLink(href, name) {
-  const link = h("a", {href, download: name});
-  document.body.append(link);
-  link.click();
-  link.remove();
+function resultFile(job) {
+  return {href: job.links.dag, name: fileName(job), bytes: job.result.bytes};
 }
 
 // Returns a shell command for the same download, which resumes after a lost connection.
