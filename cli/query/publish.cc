@@ -120,9 +120,10 @@ query::PackageReport write(const PublishCommand& command, const voxdag_reader::F
 void run(const PublishCommand& command, CommandContext& context) {
   if (!command.check.empty()) return check(command, context);
   if (command.input.empty() || command.output.empty())
-    throw Error(ErrorCode::kInvalidInput,
-                "the input or the output is missing: expected a .vdag file and --output DIR, or "
-                "--check DIR");
+    throw Error(
+        ErrorCode::kInvalidInput,
+        "the required input or output is missing: expected a .vdag file and --output DIR, or "
+        "--check DIR");
   query::PackageSpec spec;
   spec.output = command.output;
   spec.colors = !command.gray;
