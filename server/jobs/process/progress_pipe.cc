@@ -154,9 +154,9 @@ void ProgressPipe::send_advance(bool now) {
 void ProgressPipe::report_subvolumes(bool now) {
   if (!subvolumes_changed_ || (!now && wall_seconds() < next_subvolumes_s_)) return;
   subvolumes_changed_ = false;
-  send(subvolumes_.totals());
   const double start_s = thread_cpu_seconds();
   write_subvolumes();
+  send(subvolumes_.totals());  // after the file, which clients request when they see the totals
   const double pause_s = (thread_cpu_seconds() - start_s) / kMaxSubvolumesShare;
   next_subvolumes_s_ = wall_seconds() + std::max(kSubvolumesIntervalS, pause_s);
 }
