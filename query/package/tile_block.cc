@@ -161,8 +161,9 @@ void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next
     if (old(i)) {
       const uint64_t distance = distances[at++];
       if (distance == 0 || distance > next)
-        refuse_block(
-            "an old reference leads to no earlier tile, expected the number of an earlier tile");
+        refuse_block("leaf " + std::to_string(i) +
+                     " refers to no earlier tile: expected a distance from 1 to " +
+                     std::to_string(next));
       leaves[i].number = next - static_cast<uint32_t>(distance);
     } else {
       leaves[i].number = next++;

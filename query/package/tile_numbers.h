@@ -27,8 +27,9 @@ class TileNumbers {
         numbers_(space.budget, file.level(level).node_count, "the numbers of tiles"),
         offsets_(space) {
     if (file.level(level).node_count >= UINT32_MAX)
-      throw Error(ErrorCode::kLimit, file.path() + ": level " + std::to_string(level) +
-                                         " has more than 2^32 nodes: expected fewer for a package");
+      throw Error(ErrorCode::kLimit, file.path() + ": level " + std::to_string(level) + " has " +
+                                         std::to_string(file.level(level).node_count) +
+                                         " nodes: expected fewer than 2^32 - 1 for a package");
   }
 
   // Returns the number of the tile whose root is at a word offset. On the first call for a root,

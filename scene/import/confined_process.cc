@@ -88,7 +88,8 @@ class Child {
   Child(uint64_t memory_bytes, const std::function<void(const SendMessage&)>& work) {
     int ends[2];
     if (pipe2(ends, O_CLOEXEC) != 0)
-      throw Error(ErrorCode::kIo, "cannot start a process: pipe: " + errno_text(errno));
+      throw Error(ErrorCode::kIo,
+                  "cannot start the process that converts the file: pipe: " + errno_text(errno));
     const pid_t parent = getpid();
     pid_ = fork();
     if (pid_ == 0) {

@@ -32,10 +32,10 @@ class VertexReader : public PositionSource {
   const PlyFile& ply_;
   const std::vector<size_t> properties_;
   std::unique_ptr<Rows> rows_;  // reader of vertices that vary in size
-  // For vertices of a fixed size: the offset of each property in a row.
-  std::optional<FileWindow> window_;
-  std::vector<size_t> offsets_;
-  size_t row_bytes_ = 0;
+  // Used instead of rows_ for vertices of a fixed size:
+  std::optional<FileWindow> window_;  // the part of the file that is being read
+  std::vector<size_t> offsets_;       // for each of properties_, its offset in a vertex, in bytes
+  size_t row_bytes_ = 0;              // size of a vertex in the file
 };
 
 }  // namespace voxdag::ply

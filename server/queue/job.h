@@ -12,13 +12,23 @@
 
 namespace voxdag::server {
 
-//             ┌── retry ──────────────────────────────┐
-//   queued ─▶ running ─▶ succeeded                    │
-//     ▲ ▲ │     │ │ └───▶ failed ─────────────────────┤
-//     │ │ │     │ └─ canceling ─▶ canceled ──────────┘
-//     │ │ └─────┼──── cancel ───────▲   ▲
-//     │ └ resume ─ suspended ───────────┘
-//     └── transient error, restart of the service
+// The changes of state and their reasons:
+//
+//   queued ──▶ running
+//          ──▶ suspended  request of a client
+//          ──▶ canceled   request of a client
+//          ──▶ failed     the stored request cannot be read
+//   running ─▶ succeeded
+//          ──▶ failed     error of the build
+//          ──▶ queued     transient error, or the service stopped
+//          ──▶ suspended  request of a client
+//          ──▶ canceling  request of a client
+//   suspended ▶ queued    request of a client (resume)
+//          ──▶ canceled   request of a client
+//          ──▶ canceling  request of a client, while the process of the job still runs
+//   canceling ▶ canceled  the process of the job has ended
+//   failed ──▶ queued     request of a client (retry)
+//   canceled ▶ queued     request of a client (retry)
 enum class JobState {
   kQueued,
   kRunning,
@@ -34,7 +44,8 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// True for canceled, failed and succeeded. Only a retry changes these states.
+// True for canceled, failed and succeeded. Only a retry changes the first two. The state succeeded
+// is final.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {

@@ -100,7 +100,7 @@ TEST_P(Solids, EqualTheOracleOnAnyTriangles) {
 TEST_P(Solids, EqualTheOracleInSeveralTiles) {
   const auto backend = open();
   for (const oracle::SolidKind kind :
-       {oracle::SolidKind::kTorus, oracle::SolidKind::kOneInverted, oracle::SolidKind::kHoles,
+       {oracle::SolidKind::kTorus, oracle::SolidKind::kHalfInverted, oracle::SolidKind::kHoles,
         oracle::SolidKind::kSoup, oracle::SolidKind::kCrossing}) {
     SCOPED_TRACE(oracle::kind_name(kind));
     expect_solid(*backend, oracle::make_solid(kind, 7, 128), 7, SolidRule::kWinding);

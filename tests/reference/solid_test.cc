@@ -188,7 +188,7 @@ TEST_F(SolidBuilds, Warnings) {
 // as the octant in the complete build.
 TEST_F(SolidBuilds, OctantEqualsTheGrid) {
   for (const auto kind : {oracle::SolidKind::kSphere, oracle::SolidKind::kHoles,
-                          oracle::SolidKind::kTetrahedra, oracle::SolidKind::kOneInverted}) {
+                          oracle::SolidKind::kTetrahedra, oracle::SolidKind::kHalfInverted}) {
     SCOPED_TRACE(oracle::kind_name(kind));
     BuildSpec spec = spec_for(oracle::make_solid(kind, 2, 128), 128);
     spec.geometry.solid = SolidName::kWinding;

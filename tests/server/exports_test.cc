@@ -152,8 +152,8 @@ TEST_F(ServiceExports, RefuseWrongRequests) {
   EXPECT_EQ(not_problem(more, 422, "limit"), "");
 }
 
-// An export that a format cannot hold fails with the message of the command. The same request tries
-// it again.
+// A failed export has the code of its error, no files, and no path of the server. Here it fails
+// because an extract by majority cannot keep colors. The same request queues the export again.
 TEST_F(ServiceExports, ReportWhyTheyFailed) {
   start();
   put_scene("m.glb", scene_bytes());

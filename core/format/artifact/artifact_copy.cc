@@ -72,7 +72,7 @@ ArtifactRef copy_artifact(const ReadableFile& from, const ArtifactRef& ref, cons
       to.append(bytes);
     }
   }
-  return to.append_index(first, encode_index(index));
+  return to.append_index(first, encode_index(index, from.path()));
 }
 
 uint64_t write_cache_entry(FileSystem& files, const std::string& path, const std::string& partial,

@@ -117,7 +117,7 @@ void get_frames(ByteSource& source, uint32_t count, bool bricks, ArtifactLevel& 
 
 }  // namespace
 
-std::vector<std::byte> encode_index(const ArtifactIndex& index) {
+std::vector<std::byte> encode_index(const ArtifactIndex& index, const std::string& where) {
   std::vector<std::byte> bytes;
   ByteSink sink(bytes);
   uint64_t frames = 0, frame_bytes = 0;
@@ -126,9 +126,9 @@ std::vector<std::byte> encode_index(const ArtifactIndex& index) {
     for (const FrameInfo& frame : level.frames) frame_bytes += frame.bytes;
   }
   if (index.roots.size() > UINT32_MAX || frames > UINT32_MAX)
-    throw Error(ErrorCode::kLimit, "an artifact has " + std::to_string(index.roots.size()) +
-                                       " roots and " + std::to_string(frames) +
-                                       " frames: expected at most 2^32-1 of each");
+    throw Error(ErrorCode::kLimit,
+                where + ": the artifact has " + std::to_string(index.roots.size()) + " roots and " +
+                    std::to_string(frames) + " frames: expected at most 2^32-1 of each");
   sink.put(kIndexMagic);
   sink.put(kSegmentVersion);
   sink.put(index.shape.grid_levels);

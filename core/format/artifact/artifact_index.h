@@ -31,7 +31,9 @@ inline constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
 // this before allocating memory for the index, because `ref` may come from a damaged file.
 void check_index_bytes(const ArtifactRef& ref, const std::string& where);
 
-std::vector<std::byte> encode_index(const ArtifactIndex& index);
+// Throws Error{kLimit} if the artifact has too many roots or frames. The message begins with
+// `where`.
+std::vector<std::byte> encode_index(const ArtifactIndex& index, const std::string& where);
 
 // Decodes the index of the artifact at `ref`. Throws Error{kCorrupt} or Error{kUnsupportedVersion}
 // if any field violates the rules of docs/format.md, so a decoded index needs no further check. The

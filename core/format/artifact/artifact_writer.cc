@@ -183,7 +183,8 @@ ArtifactRef ArtifactWriter::finish(std::span<const ArtifactRoot> roots) {
   State& s = *state_;
   if (s.level_open) s.broken("the level is still open: expected the end of all levels");
   s.index.roots.assign(roots.begin(), roots.end());
-  return s.segment.append_index(s.offset, encode_index(s.index));
+  const std::string where = "artifact for segment " + std::to_string(s.segment.id());
+  return s.segment.append_index(s.offset, encode_index(s.index, where));
 }
 
 }  // namespace voxdag

@@ -181,8 +181,8 @@ class ColorVerifier {
     if (differing.first != expected.blocks.end())
       fail(tier, i,
            "byte " + std::to_string(differing.first - expected.blocks.begin()) +
-               " differs from the value computed from the cell's children, or is not 0 after "
-               "the last value");
+               " of its data is wrong: expected the value computed from the children of its cell, "
+               "or 0 after the last value");
   }
 
   // Returns the value that a cell of a tier's finest level must have. This value is computed from
@@ -252,7 +252,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
         verifier.fail(tier, i,
                       "its data begin at unit " + std::to_string(region.first_unit) +
                           " of 16 bytes: expected " + std::to_string(expected) +
-                          ", the end of the previous region");
+                          (i > 0 ? ", the end of the previous region" : ", the first unit"));
       if (i > 0 && region.morton <= before.morton)
         verifier.fail(tier, i,
                       "its Morton code is " + std::to_string(region.morton) +

@@ -94,7 +94,8 @@ class TopTree {
     std::vector<LargeTriangle> large_;           // triangles that touch more than kMaxTouched cells
     std::array<uint32_t, kSlots> last_entry_{};  // by code % kSlots: index of the last such entry
     std::vector<uint64_t> touched_;              // cells that the last triangle touches
-    CubeInside last_cell_;  // cell of the last triangle that is inside one cell
+    // The cell of the most recent triangle that lies in a single cell. add() tests this cell first.
+    CubeInside last_cell_;
     size_t entry_of_last_cell_ = 0;
   };
   void add(Tally& tally);

@@ -24,9 +24,9 @@ constexpr double kLateGrowth = 2.5;
 constexpr double kGrowthDecay = 0.75;
 // Each doubling away from the pilot widens the ranges of nodes and bytes by this factor.
 constexpr double kSpreadPerDoubling = 1.12;
-// Bytes of the global file per node. A pilot's file has fewer bytes per node, because coarse levels
-// repeat more. So the pilot's bytes per node are multiplied by kBytesGrowthPerDoubling with each
-// doubling of R, up to kMaxBytesPerNode.
+// The finer the grid, the more bytes per node the global file has. So the estimate multiplies the
+// bytes per node of the pilot's file by kBytesGrowthPerDoubling with each doubling of R. The result
+// is at most kMaxBytesPerNode.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
 // Measured on real scenes: nodes of all artifacts per node of the global DAG, and compressed bytes

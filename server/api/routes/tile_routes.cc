@@ -89,8 +89,10 @@ query::ColorPageAddress parse_page(const std::string& text) {
   const auto numbers = parse_numbers<uint64_t, 4>(text, '.');
   if (!numbers || (*numbers)[0] > kMaxColorLevel ||
       std::any_of(numbers->begin() + 1, numbers->end(), [](uint64_t c) { return c > kMaxPage; }))
-    throw bad_request("page '" + printable(text) +
-                      "' of 'pages': expected LEVEL.X.Y.Z, the level and the place of a page");
+    throw bad_request(
+        "page '" + printable(text) + "' of 'pages': expected LEVEL.X.Y.Z, with a level from 0 to " +
+        std::to_string(kMaxColorLevel) + " and the position of a page, three numbers from 0 to " +
+        std::to_string(kMaxPage));
   const auto& [level, x, y, z] = *numbers;
   return {static_cast<uint32_t>(level), {x, y, z}};
 }

@@ -22,7 +22,7 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   ref.checksum = checksum64(bytes);
   try {
     const ArtifactIndex index = decode_index(bytes, ref, "input");
-    fuzz::require(std::ranges::equal(encode_index(index), bytes),
+    fuzz::require(std::ranges::equal(encode_index(index, "fuzz"), bytes),
                   "an index that was decoded is encoded to the same bytes");
   } catch (const Error&) {
   }

@@ -131,7 +131,7 @@ class SolidMaker {
         return add_touching(out);
       case SolidKind::kTies:
         return add_ties(out);
-      case SolidKind::kOneInverted:
+      case SolidKind::kHalfInverted:
         add_tetrahedra(out);
         for (size_t i = 0; i < out.size() / 2; ++i) invert(out[i]);
         return;

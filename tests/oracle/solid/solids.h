@@ -13,15 +13,15 @@ enum class SolidKind {
   kBox,  // a box along the axes
   kSphere,
   kTorus,
-  kTetrahedra,   // random overlapping tetrahedra
-  kNested,       // a sphere in a sphere, the inner one inverted
-  kNestedAlike,  // a sphere in a sphere, both facing outward
-  kInverted,     // a sphere turned inside out
-  kDoubled,      // every face twice
-  kCanceled,     // every face and its mirror image
-  kTouching,     // two boxes that share a face
-  kTies,         // tetrahedra with edges through corners and centers of voxels
-  kOneInverted,  // overlapping tetrahedra, half of them inverted
+  kTetrahedra,    // random overlapping tetrahedra
+  kNested,        // a sphere in a sphere, the inner one inverted
+  kNestedAlike,   // a sphere in a sphere, both facing outward
+  kInverted,      // a sphere turned inside out
+  kDoubled,       // every face twice
+  kCanceled,      // every face and its mirror image
+  kTouching,      // two boxes that share a face
+  kTies,          // tetrahedra with edges through corners and centers of voxels
+  kHalfInverted,  // overlapping tetrahedra, half of them inverted
   // Open.
   kOpenBox,     // a box without its lid
   kHoles,       // a sphere from which triangles are missing
@@ -34,7 +34,7 @@ enum class SolidKind {
 constexpr SolidKind kClosedSolids[] = {
     SolidKind::kBox,      SolidKind::kSphere,   SolidKind::kTorus,    SolidKind::kTetrahedra,
     SolidKind::kNested,   SolidKind::kInverted, SolidKind::kDoubled,  SolidKind::kNestedAlike,
-    SolidKind::kTouching, SolidKind::kTies,     SolidKind::kCanceled, SolidKind::kOneInverted};
+    SolidKind::kTouching, SolidKind::kTies,     SolidKind::kCanceled, SolidKind::kHalfInverted};
 constexpr SolidKind kOpenSolids[] = {
     SolidKind::kOpenBox, SolidKind::kHoles,    SolidKind::kPlane,   SolidKind::kThreeWalls,
     SolidKind::kSoup,    SolidKind::kWithRest, SolidKind::kCrossing};

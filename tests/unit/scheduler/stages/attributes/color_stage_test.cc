@@ -84,8 +84,9 @@ TEST_F(ColorStage, AreThoseOfTheMaterials) {
   EXPECT_GT(counts.red, 4000u);
   EXPECT_GT(counts.blue, 4000u);
   EXPECT_GT(counts.green, 500u);
-  // A color block mixes colors if it has cells of both halves of the image, or of the sheet and the
-  // triangle.
+  // Few cells have other colors. Colors are stored in blocks of up to 32 cells and are interpolated
+  // between two colors of the block. So only a block with cells of both halves of the image, or of
+  // the sheet and the triangle, can have other colors.
   EXPECT_LT(counts.other, file->voxels() / 10);
   NoProgress progress;
   MemoryBudget budget(uint64_t{64} << 20);
