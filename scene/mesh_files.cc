@@ -170,7 +170,7 @@ void check_lengths(const std::string& path, const Mesh& mesh) {
 }
 
 // Returns the path at which the PLY reader looks for the texture `name` of the mesh at `mesh_path`.
-// `mesh_path` has no folder. Throws if `name` is not the name of a file.
+// `mesh_path` has no folder. Throws if `name` cannot be the name of a file.
 std::string texture_path(const std::string& mesh_path, const std::string& name) {
   if (name.empty() || name.find_first_of("/\\:\"\n\r") != name.npos)
     refuse_mesh(mesh_path, "the texture's name \"" + name +

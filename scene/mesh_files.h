@@ -23,8 +23,9 @@ class MeshFiles : public ForwardingFiles {
   explicit MeshFiles(FileSystem& files) : ForwardingFiles(files) {}
   MeshFiles(FileSystem& files, const Mesh& mesh) : ForwardingFiles(files) { add(kPath, mesh); }
 
-  // Adds a mesh under a path without '/'. Throws Error{kInvalidInput} for arrays of wrong lengths,
-  // and for a texture whose name is not the name of a file.
+  // Adds a mesh under a path without '/'. Throws Error{kInvalidInput} if an array has a wrong
+  // length, or if the name of a texture is empty or has a slash, backslash, colon, double quote or
+  // line end.
   void add(const std::string& path, const Mesh& mesh);
 
   // Adds a scene file whose bytes are in memory.

@@ -1,7 +1,8 @@
 // Finds the tiles that a viewer needs to draw a picture. A tile is needed if, without it, the first
-// cell of some ray would be coarser than requested. A tile with its root at level l contains the
-// cells from level l + 3 on. The tile above contains the cells of levels l + 1 and l + 2, as the
-// coarse brick of the root.
+// cell of some ray would be coarser than requested. Let a tile have its
+// root at level l. The tile that refers to this root also stores a mask of 4x4x4 cells below the
+// root (query/tiles/tile.h). So a viewer without the tile has the cells of levels l + 1 and l + 2.
+// It needs the tile only for the cells of level l + 3 and finer levels.
 #pragma once
 
 #include <algorithm>

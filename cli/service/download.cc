@@ -73,8 +73,9 @@ void download_export(const DownloadCommand& command, ServiceClient& service, Fil
 void run(const DownloadCommand& command, ServiceClient& service, CommandContext& context) {
   const bool is_export = !command.spec.to.empty();
   if (!is_export && !options_json(command.spec).empty())
-    throw Error(ErrorCode::kInvalidInput,
-                "the options of exports, such as --level: expected --to FORMAT, too");
+    throw Error(
+        ErrorCode::kInvalidInput,
+        "an option of exports, such as --level, was given without --to: expected also --to FORMAT");
   const IsOwnFile is_own = is_export && !command.spec.is_extract()
                                ? [](const ReadableFile& file) { return file.size() == 0; }
                                : IsOwnFile(is_global_file);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 
 #include "cli/option_fields.h"
@@ -36,9 +37,15 @@ std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSyst
 // Throws before the upload if the server would refuse the labels.
 void check_labels(const std::vector<std::string>& labels) {
   if (labels.empty() || fits(server::kLabelsField, labels)) return;
+  const auto wrong = std::ranges::find_if(labels, [](const std::string& label) {
+    return !fits(server::kLabelsField, std::vector<std::string>{label});
+  });
+  const std::string count = std::to_string(labels.size());
+  const std::string what =
+      wrong == labels.end() ? count + " items"
+                            : "item " + std::to_string(wrong - labels.begin() + 1) + " of " + count;
   throw Error(ErrorCode::kInvalidInput,
-              "--label: " + std::to_string(labels.size()) +
-                  (labels.size() == 1 ? " item" : " items") + ": expected " +
+              "--label: " + what + ": expected " +
                   expectation<std::vector<std::string>>(server::kLabelsField));
 }
 

@@ -11,8 +11,9 @@ namespace {
 constexpr uint32_t kLiterals = 256, kLengthCodes = 24, kDistanceCodes = 40;
 constexpr uint32_t kMaxCacheBits = 11;
 constexpr int kMaxCodeLength = 15;
-// Bytes of one set of libwebp's decoding tables, without the entries for the color cache. A set has
-// five tables (kGreenBytes: the green table; kSetBytes: the others) and 64 packed entries.
+// A set of libwebp's decoding tables has five tables and 64 packed entries. kGreenBytes: bytes of
+// the green table, without its entries for the color cache. kSetBytes: bytes of the other four
+// tables and of the packed entries.
 constexpr uint64_t kSetBytes = 4 * 2300 + 1024, kGreenBytes = 4 * 654;
 
 struct BrokenStream {};

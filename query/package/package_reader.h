@@ -32,9 +32,9 @@ class PackageReader {
   // set.
   std::vector<uint32_t> color_page(uint32_t level, const std::array<uint64_t, 3>& position) const;
 
-  // Checks the package: the sizes and hashes of all files, the contents of all blocks, and that the
-  // tiles of each band are exactly those to which the band above refers. Throws the Error of the
-  // first problem.
+  // Checks the sizes and hashes of all files of the package, and the contents of all blocks. Also
+  // checks the bands (the tiles whose roots are on one level): each band must have exactly the
+  // tiles to which the band above refers. Throws the Error of the first problem.
   void check(Progress& progress, const CancelToken& cancel) const;
 
  private:

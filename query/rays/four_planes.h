@@ -1,7 +1,9 @@
 // Computes which children of a cell a ray crosses, from the planes that bound the children. The
-// planes are two vectors of four doubles. Several source files include this header, each compiled
-// for a different instruction set. So all functions of this header have internal linkage: the
-// linker must not replace a function by its version for another instruction set.
+// planes are stored in two vectors of four doubles: one for the lower and one for the upper
+// children. A vector has a number for each of x, y and z; the fourth number is not used. Several
+// source files include this header, each compiled for a different instruction set. So all functions
+// of this header have internal linkage: the linker must not replace a function by its version for
+// another instruction set.
 #pragma once
 
 #include <cstdint>

@@ -364,7 +364,10 @@ void Exports::run_one(Entry& entry, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   log_("export " + it.id + " of job " + it.job + " running");
   try {
-    if (!is_recorded) throw Error(ErrorCode::kIo, "the start of the export was not recorded");
+    if (!is_recorded)
+      throw Error(ErrorCode::kIo,
+                  "the start of the export could not be recorded in its folder (the log has the "
+                  "reason): expected a writable folder of the job");
     end = run_process(it, *live);
   } catch (const std::exception& error) {
     log_("export " + it.id + " of job " + it.job + ": " + error.what());

@@ -243,8 +243,8 @@ SceneStore::NameLock::NameLock(SceneStore& store, const std::string& name)
   std::lock_guard lock(store_.mutex_);
   if (!store_.busy_.insert(name_).second)
     throw RequestError(RequestError::Kind::kConflict,
-                       "another request is uploading the scene '" + name_ +
-                           "': expected one upload of a scene at a time");
+                       "another request is uploading or deleting the scene '" + name_ +
+                           "': expected one such request for a scene at a time");
 }
 
 SceneStore::NameLock::~NameLock() {

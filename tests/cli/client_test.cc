@@ -127,7 +127,7 @@ TEST_F(Client, LabelsAndFindsJobs) {
   const double uploaded = metric("voxdag_uploaded_bytes_total");
   ASSERT_EQ(run({"generate", "soup", "other.glb", "--triangles", "10"}).status, 0);
   for (const std::string& label : {std::string(65, 'x'), std::string("a\nb"), std::string()})
-    expect_error(2, "--label: 1 item: expected 1 to 16 items, each 1 to 64 characters",
+    expect_error(2, "--label: item 1 of 1: expected 1 to 16 items, each 1 to 64 characters",
                  {"submit", "other.glb", "-r", "16", "--label", label});
   std::vector<std::string> many = {"submit", "other.glb", "-r", "16"};
   for (int i = 0; i < 17; ++i) many.insert(many.end(), {"--label", std::to_string(i)});

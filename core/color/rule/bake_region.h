@@ -1,7 +1,8 @@
 // Computes the colors and other attributes of the cells in a region of the color grid, by the rule
-// of docs/color.md. The sum of a cell is a function of the triangles that touch the cell, of their
-// materials and of the images. The sum does not depend on the order of the triangles, or on the
-// region in which the cell is baked.
+// of docs/color.md. The values of a cell are computed from a sum over the triangles that touch the
+// cell (ColorSum in core/color/color_sum.h). This sum depends only on these triangles, their
+// materials and the images. It does not depend on the order of the triangles, or on the region in
+// which the cell is baked.
 //
 // `Textures` is a reader of images. An image is a pyramid of box-filtered levels, linear and with
 // 16 bits per channel. The first level is the image itself. The members of `Textures` are

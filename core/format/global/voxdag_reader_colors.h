@@ -144,11 +144,11 @@ struct ColorRegion {
   Normal normal(uint64_t i) const { return octahedral_normal(blocks + 2 * i); }
   // Returns the color of cell `i` of the region's cells. `i` must be below `cells`.
   Rgb color(uint64_t i) const { return block_color(blocks + i / 32 * 16, unsigned(i % 32)); }
-  // The prefixes are two tables that help to compute ranks. Table 0 is for the cells of the finest
-  // level, table 1 for the cells of the next coarser level. A table has one entry for each ancestor
-  // four levels above these cells, in Morton order. The entry is the number of cells of the table's
-  // level that come before the cells below this ancestor in the region. prefix_count() returns the
-  // number of entries of a table.
+  // Two tables of prefixes save counting when the rank of a cell is computed (see the top of this
+  // file). Table 0 is for the cells of the finest level, table 1 for those of the next coarser
+  // level. A table has one entry for each set cell four levels above, in Morton order: the rank of
+  // the first cell below that cell. This rank is the number of cells of the table's level that come
+  // before it in the region. prefix_count() returns the number of entries of a table.
   uint64_t prefix_count(uint32_t table) const {
     return table + 5 < level_count ? counts[table + 4] : 0;
   }

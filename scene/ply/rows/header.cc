@@ -91,7 +91,10 @@ class HeaderParser {
   // may be the first byte of the data. So this LF does not count as a part of the line end.
   void end_line() {
     if (at_ == text_.size()) {
-      if (is_whole_file_) refuse("has no end, expected a header that ends with end_header");
+      if (is_whole_file_)
+        refuse(
+            "is where the file ends, expected more lines, up to the line end_header and its line "
+            "end");
       throw Error(ErrorCode::kLimit, path_ + ": its header has over " +
                                          std::to_string(kMaxHeaderBytes) +
                                          " bytes, expected end_header within them");

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/base/error.h"
@@ -23,6 +24,8 @@ class LeavingPiece {
 
   void read(TriangleCursor& cursor, uint64_t first, uint64_t count) {
     triangles_.clear();
+    where_ = "triangles " + std::to_string(first) + " to " + std::to_string(first + count - 1) +
+             " of the scene: ";
     cursor.read_snapped(first, count, grid_, [this](std::span<const SnappedTriangle> batch) {
       for (const SnappedTriangle& triangle : batch) add(triangle);
     });
@@ -45,16 +48,18 @@ class LeavingPiece {
     if (!leaves || outside > 1) return;
     if (is_far)
       throw Error(ErrorCode::kLimit,
-                  "a triangle that sample rows of the solid can cross has a vertex 2^32 or more "
-                  "voxels away from the grid's low corner: expected less than 2^32 voxels on each "
-                  "axis (--bounds)");
+                  where_ +
+                      "a triangle that sample rows of the solid can cross has a vertex 2^32 or "
+                      "more voxels away from the grid's low corner: expected less than 2^32 voxels "
+                      "on each axis (--bounds)");
     FixedTriangle& triangle = triangles_.emplace_back();
     for (int i = 0; i < 3; ++i)
       for (int a = 0; a < 3; ++a) triangle.v[i][a] = static_cast<int64_t>(u[i][a]);
   }
 
   const Grid& grid_;
-  const double end_;  // the grid's high corner, in lattice units
+  const double end_;   // the grid's high corner, in lattice units
+  std::string where_;  // names the triangles that are being read, for messages
   std::vector<FixedTriangle> triangles_;
 };
 

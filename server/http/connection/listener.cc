@@ -35,9 +35,12 @@ Addresses resolve(const std::string& address, int port) {
   hints.ai_socktype = SOCK_STREAM;
   hints.ai_flags = AI_PASSIVE | AI_NUMERICSERV;
   addrinfo* list = nullptr;
-  if (getaddrinfo(address.c_str(), std::to_string(port).c_str(), &hints, &list) != 0 || !list)
+  const int failure = getaddrinfo(address.c_str(), std::to_string(port).c_str(), &hints, &list);
+  if (failure != 0 || !list)
     throw Error(ErrorCode::kInvalidInput,
-                "cannot listen on '" + address + "': expected an address of this machine");
+                "cannot listen on '" + address + "' (" +
+                    (failure != 0 ? gai_strerror(failure) : "it has no address") +
+                    "): expected an address of this machine");
   return Addresses(list);
 }
 

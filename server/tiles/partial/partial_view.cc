@@ -134,8 +134,10 @@ void PartialView::refresh(const std::string& work_folder) {
   try {
     cubes_.refresh(files_, work_folder, kMaxReadingS);
     if (cubes_.total() == 0)
-      throw Error(ErrorCode::kNotFound,
-                  "the subvolumes are not planned yet: expected a job that has read its scene");
+      throw Error(
+          ErrorCode::kNotFound,
+          work_folder +
+              ": the subvolumes are not planned yet: expected a job that has read its scene");
   } catch (const Error& error) {
     // The job's process may have removed the folder while it was being read.
     if (error.code() != ErrorCode::kNotFound && files_.exists(WorkFolder::store_path(work_folder)))

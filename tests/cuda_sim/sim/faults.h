@@ -16,8 +16,8 @@ struct Fault {
   Call call = Call::kOther;
   uint64_t skipped = 0;  // number of calls of this kind that succeed before the failure
   cudaError_t status = cudaErrorLaunchFailure;
-  // True if calls after the failed call also fail, until the next plan: all calls if `call` is
-  // kOther, otherwise only allocations.
+  // True if later calls also fail, until the next plan. If `call` is kOther, all later calls fail.
+  // Otherwise only later allocations fail.
   bool sticky = false;
 };
 

@@ -357,8 +357,8 @@ TEST(Materials, OfSeveralFiles) {
   EXPECT_EQ(material(2).number, 3u);
 }
 
-// Triangles without a material have the number after the last material. A material that lost its
-// image keeps its number.
+// A triangle without a material has the number after the last material. A triangle without texture
+// coordinates uses a copy of its material without the image. This copy has the material's number.
 TEST(Materials, NumbersOfThoseThatAreNotListed) {
   SceneBuilder scene = textured("");
   const Json primitive = only_primitive(scene);
