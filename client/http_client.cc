@@ -1,7 +1,11 @@
 #include "client/http_client.h"
 
+#include <fcntl.h>
 #include <httplib.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <mutex>
 #include <nlohmann/json.hpp>
 
 namespace voxdag::client {
@@ -44,6 +48,33 @@ void check_url(const std::string& url) {
               "server '" + url + "': expected http://HOST:PORT or https://HOST[:PORT]");
 }
 
+// A duplicate of the descriptor of the newest socket, so that another thread can shut the socket
+// down. httplib::Client::stop() cannot do that: it waits while a connection is being opened, and a
+// server that sends its part of a TLS handshake byte by byte prolongs this time without limit.
+// Thread-safe.
+class SocketHandle {
+ public:
+  SocketHandle() = default;
+  SocketHandle(const SocketHandle&) = delete;
+  ~SocketHandle() { set(-1); }
+
+  void duplicate(int socket) { set(fcntl(socket, F_DUPFD_CLOEXEC, 0)); }
+  void shut_down() {
+    std::lock_guard lock(mutex_);
+    if (descriptor_ >= 0) shutdown(descriptor_, SHUT_RDWR);
+  }
+
+ private:
+  void set(int descriptor) {
+    std::lock_guard lock(mutex_);
+    if (descriptor_ >= 0) close(descriptor_);
+    descriptor_ = descriptor;
+  }
+
+  std::mutex mutex_;
+  int descriptor_ = -1;  // -1: none
+};
+
 }  // namespace
 
 std::string ClientResponse::header(std::string_view name) const {
@@ -65,6 +96,7 @@ struct HttpClient::Impl {
     http.set_write_timeout(timeout);
     http.set_keep_alive(true);
     http.set_tcp_nodelay(true);
+    http.set_socket_options([this](int created) { socket.duplicate(created); });
     http.set_decompress(false);
     http.set_url_encode(false);  // callers pass encoded paths
     if (!options.token.empty()) http.set_bearer_token_auth(options.token.c_str());
@@ -79,6 +111,7 @@ struct HttpClient::Impl {
   }
 
   const std::string url;
+  SocketHandle socket;
   httplib::Client http;
 };
 
@@ -129,7 +162,7 @@ int HttpClient::send_for_status(const std::string& method, const std::string& pa
   return status != 0 ? status : impl_->check(result).status;
 }
 
-void HttpClient::stop() { impl_->http.stop(); }
+void HttpClient::stop() { impl_->socket.shut_down(); }
 
 ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
                                   const HeaderMap& headers) {

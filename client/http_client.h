@@ -53,9 +53,9 @@ class HttpClient {
   int send_for_status(const std::string& method, const std::string& path, const std::string& body,
                       const HeaderMap& headers = {});
 
-  // Closes the connection of a request in progress, which then throws Error{kIo}. Any thread may
-  // call it. It has no effect while no connection is open, so callers repeat it until the request
-  // ends. While a connection is being opened, the call waits.
+  // Shuts down the connection of a request in progress, which then throws Error{kIo}. Any thread
+  // may call it, also while the connection is being opened. It does not wait. It has no effect
+  // before the socket exists, so callers repeat it until the request ends.
   void stop();
 
   // Sends `size` bytes with PUT. source(offset, max_bytes) must return the bytes from `offset` on:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <limits>
 #include <map>
 #include <set>
@@ -70,6 +71,9 @@ Webhooks::Webhooks(const ServerConfig& config, FileSystem& files, JobQueue& queu
       steps_(log, config.before_step),
       ended_jobs_(config.data_folder + "/queue.db"),
       store_(config.data_folder + "/webhooks.db", ended_jobs_.last_number()) {
+  // OpenSSL's next write to a connection that stop() or a receiver has closed raises SIGPIPE. The
+  // signal would end the process.
+  std::signal(SIGPIPE, SIG_IGN);
   for (const std::string& prefix : options_.allow) {
     allowed_.push_back(parse_http_url(prefix));
     if (allowed_.back().scheme == "https" && !client::supports_https())
@@ -295,7 +299,7 @@ void Webhooks::send(Attempt& attempt) const {
 
 void Webhooks::end_overdue_attempts() {
   for (const auto& attempt : attempts_) {
-    // A call has no effect before the connection is open, so the next pass calls it again.
+    // A call has no effect before the socket exists, so the next pass calls it again.
     if (stops_ || wall_seconds() >= attempt->deadline_s) attempt->http->stop();
   }
 }

@@ -28,7 +28,7 @@ namespace voxdag::server {
 class Webhooks {
  public:
   // Throws Error{kInvalidInput} for an invalid secret, and if this build cannot send to an https
-  // URL that the configuration allows.
+  // URL that the configuration allows. Makes the process ignore SIGPIPE.
   Webhooks(const ServerConfig& config, FileSystem& files, JobQueue& queue, Log log);
   // Calls stop().
   ~Webhooks();
@@ -38,7 +38,7 @@ class Webhooks {
   // Returns the member "webhook" of JOB (docs/api.md) as JSON; "null" if the job has none.
   std::string job_member(const Job& job);
   // Starts no more attempts, and ends attempts in progress. They are repeated by the next service.
-  // A connection that is being opened ends after at most three seconds.
+  // Waits for the resolution of host names in progress, which cannot be ended.
   void stop();
 
  private:

@@ -56,6 +56,11 @@ class Receiver {
   std::string url(const std::string& path = "") const {
     return "http://127.0.0.1:" + std::to_string(port_) + path;
   }
+  // All connections get these bytes, and after them a zero byte every 20 ms, until they are closed.
+  void begin_with(const std::string& bytes) {
+    std::lock_guard lock(mutex_);
+    beginning_ = bytes;
+  }
   // The next requests get these answers; later requests get "204 No Content". The answer "" means
   // none: the connection stays open.
   void answer_with(std::vector<std::string> answers) {
@@ -77,6 +82,7 @@ class Receiver {
   }
 
   void serve(int connection) {
+    if (send_slowly(connection)) return;
     std::string text;
     char piece[4096];
     pollfd waiting{connection, POLLIN, 0};
@@ -111,6 +117,21 @@ class Receiver {
     return answer;
   }
 
+  bool send_slowly(int connection) {
+    std::string piece;
+    {
+      std::lock_guard lock(mutex_);
+      piece = beginning_;
+    }
+    if (piece.empty()) return false;
+    while (!stops_ && ::send(connection, piece.data(), piece.size(), MSG_NOSIGNAL) > 0) {
+      piece.assign(1, '\0');
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    close(connection);
+    return true;
+  }
+
   void wait_for_close(pollfd& waiting) const {
     char byte;
     while (!stops_ && (poll(&waiting, 1, 20) == 0 || recv(waiting.fd, &byte, 1, 0) > 0)) {
@@ -123,6 +144,7 @@ class Receiver {
   std::thread thread_;
   std::vector<std::thread> threads_;  // used by thread_, then by the destructor
   std::mutex mutex_;                  // guards the members below
+  std::string beginning_;
   std::vector<std::string> answers_;
   std::vector<Received> received_;
 };
@@ -294,6 +316,22 @@ TEST_F(WebhookService, EndsAttemptsAtTheDeadline) {
   EXPECT_GE(until_webhook(id, "delivered")["attempts"], 2);
   EXPECT_NE(log().find("attempt 1 of 10 failed: no answer within 0.2 s"), std::string::npos)
       << log();
+}
+
+// A TLS handshake that makes slow progress also ends at the deadline, and when the service stops.
+TEST_F(WebhookService, EndsSlowHandshakes) {
+  if (!client::supports_https()) GTEST_SKIP() << "the HTTP library of this build has no TLS";
+  Receiver slow;
+  slow.begin_with(std::string("\x16\x03\x03\x40\x00\x02\x00\x3f\x00", 9));  // a ServerHello
+  const std::string url = "https" + slow.url("/a").substr(4);
+  config_.webhooks.allow.push_back(url);
+  config_.webhooks.timeout_s = 0.3;
+  start_with_scene();
+  const std::string id = post_with(url);
+  EXPECT_TRUE(until([&] { return job(id)["webhook"]["attempts"] >= 2; }));
+  const std::string fast = post_with(receiver_.url("/hooks"));
+  EXPECT_EQ(until_webhook(fast, "delivered")["attempts"], 1);
+  stop();
 }
 
 // If the service is killed after it has recorded the end of a job, but before it has stored the
