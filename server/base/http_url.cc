@@ -49,6 +49,18 @@ void check_url_host(const std::string& host) {
           "a host name, an IPv4 address, or an IPv6 address in brackets");
 }
 
+// Returns false if a receiver could resolve the path to another folder.
+bool is_plain_path(std::string_view path) {
+  for (size_t begin = 0; begin <= path.size();) {
+    const size_t end = std::min(path.find('/', begin), path.size());
+    std::string_view segment = path.substr(begin, end - begin);
+    segment = segment.substr(0, segment.find(';'));  // some servers remove path parameters first
+    if (segment == "." || segment == "..") return false;
+    begin = end + 1;
+  }
+  return true;
+}
+
 void check_url_path(std::string_view path) {
   const auto decoded = percent_decoded(path);
   require(decoded.has_value(), "two hexadecimal digits after each percent sign of the path");
@@ -56,12 +68,12 @@ void check_url_path(std::string_view path) {
                   std::count(decoded->begin(), decoded->end(), '/') &&
               decoded->find('\\') == std::string::npos,
           "a path without backslashes and encoded slashes");
-  for (size_t begin = 0; begin <= decoded->size();) {
-    const size_t end = std::min(decoded->find('/', begin), decoded->size());
-    const std::string segment = decoded->substr(begin, end - begin);
-    require(segment != "." && segment != "..", "a path without the segments '.' and '..'");
-    begin = end + 1;
-  }
+  require(is_plain_path(*decoded), "a path without the segments '.' and '..'");
+  // Some receivers decode a path twice.
+  require(decoded->find('%') == std::string::npos, "a path without encoded percent signs");
+  require(std::ranges::none_of(
+              *decoded, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 127; }),
+          "a path without encoded control characters");
 }
 
 }  // namespace

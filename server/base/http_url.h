@@ -20,8 +20,9 @@ struct HttpUrl {
 
 // Parses a URL of at most 1024 characters. Throws Error{kInvalidInput}, whose message names the
 // part that is wrong. Refuses user names and passwords, fragments, characters that a URL must
-// encode, and paths that a receiver could resolve to another folder: segments "." and "..",
-// backslashes and encoded slashes.
+// encode, and paths that a receiver could resolve to another folder: segments "." and ".." (also
+// with path parameters, as in "..;x"), backslashes, and encoded slashes, percent signs and control
+// characters.
 HttpUrl parse_http_url(std::string_view text);
 
 // True if the URL has the same scheme, host and port as the prefix, and its path is the path of the

@@ -15,6 +15,7 @@ TEST(HttpUrl, HasItsParts) {
   EXPECT_EQ(url.target, "/a/b?x=1");
   EXPECT_EQ(url.path(), "/a/b");
   EXPECT_EQ(url.origin(), "https://hooks.example.org:443");
+  EXPECT_EQ(parse_http_url("http://h/a%20b;c=1/..d").target, "/a%20b;c=1/..d");
   EXPECT_EQ(parse_http_url("http://h").target, "/");
   EXPECT_EQ(parse_http_url("http://h?q").target, "/?q");
   EXPECT_EQ(parse_http_url("http://[::1]:8080/x").origin(), "http://[::1]:8080");
@@ -44,6 +45,11 @@ TEST(HttpUrl, IsRefusedWithAReason) {
       {"http://h/a/../b", "segments"},
       {"http://h/a/%2E%2e", "segments"},
       {"http://h/./b", "segments"},
+      {"http://h/a/..;/b", "segments"},
+      {"http://h/a/%2e%2E;x/b", "segments"},
+      {"http://h/a/%252e%252e/b", "percent signs"},
+      {"http://h/a%00", "control characters"},
+      {"http://h/a%0d%0aX:y", "control characters"},
       {"http://h/a%2f..%2fb", "slashes"},
       {"http://h/a%5cb", "slashes"},
       {"http://h/" + std::string(1024, 'a'), "1024"},
