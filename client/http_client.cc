@@ -8,6 +8,8 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "client/received_bytes.h"
+
 namespace voxdag::client {
 namespace {
 
@@ -62,6 +64,10 @@ class SocketHandle {
   void shut_down() {
     std::lock_guard lock(mutex_);
     if (descriptor_ >= 0) shutdown(descriptor_, SHUT_RDWR);
+  }
+  uint64_t received() {
+    std::lock_guard lock(mutex_);
+    return descriptor_ >= 0 ? received_bytes(descriptor_) : 0;
   }
 
  private:
@@ -163,6 +169,8 @@ int HttpClient::send_for_status(const std::string& method, const std::string& pa
 }
 
 void HttpClient::stop() { impl_->socket.shut_down(); }
+
+uint64_t HttpClient::received() const { return impl_->socket.received(); }
 
 ClientResponse HttpClient::upload(const std::string& path, uint64_t size, const Source& source,
                                   const HeaderMap& headers) {

@@ -96,8 +96,8 @@ void fields(Visitor& visit, WebhookOptions& webhooks) {
   visit("allow", webhooks.allow);
   visit("secret_file", webhooks.secret_file);
   visit(Field("max_attempts").range(1, 100), webhooks.max_attempts);
-  visit(Field("backoff_s").at_least(0), webhooks.backoff_s);
-  visit(Field("max_backoff_s").at_least(0), webhooks.max_backoff_s);
+  visit(Field("backoff_s").range(0, 604800), webhooks.backoff_s);
+  visit(Field("max_backoff_s").range(0, 604800), webhooks.max_backoff_s);
   visit(Field("timeout_s").above_zero(), webhooks.timeout_s);
 }
 

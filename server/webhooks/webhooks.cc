@@ -27,7 +27,10 @@ constexpr uint64_t kMaxPending = 10000;
 constexpr size_t kEndsPerRead = 100;
 constexpr double kMaxConnectS = 3;
 constexpr double kMaxWebhookSleepS = 1;
-constexpr double kStopIntervalS = 0.05;   // between tries to end attempts
+constexpr double kStopIntervalS = 0.05;  // between checks of the attempts in progress
+// The HTTP library has no limit for the lines of an answer. With this limit, kMaxActive attempts
+// need little memory: what arrives within kStopIntervalS.
+constexpr uint64_t kMaxAnswerBytes = 256 << 10;
 constexpr double kMaxLookIntervalS = 60;  // in case that the clock was set
 constexpr double kForgetIntervalS = 600;
 constexpr size_t kMaxErrorBytes = 200;
@@ -59,7 +62,8 @@ struct Webhooks::Attempt {
   std::unique_ptr<client::HttpClient> http;
   std::thread thread;
   std::atomic<bool> ended{false};
-  double end_s = 0;  // in wall_seconds()
+  double end_s = 0;          // in wall_seconds()
+  bool is_too_long = false;  // the answer has more than kMaxAnswerBytes; not set by the thread
   int status = 0;
   std::string error;
 };
@@ -171,10 +175,8 @@ void Webhooks::run() {
 }
 
 double Webhooks::max_wait_s() const {
-  double wait_s = std::clamp(next_due_s_ - unix_seconds(), kStopIntervalS, kMaxWebhookSleepS);
-  for (const auto& attempt : attempts_)
-    wait_s = std::clamp(attempt->deadline_s - wall_seconds(), kStopIntervalS, wait_s);
-  return wait_s;
+  if (!attempts_.empty()) return kStopIntervalS;
+  return std::clamp(next_due_s_ - unix_seconds(), kStopIntervalS, kMaxWebhookSleepS);
 }
 
 void Webhooks::collect() {
@@ -299,8 +301,10 @@ void Webhooks::send(Attempt& attempt) const {
 
 void Webhooks::end_overdue_attempts() {
   for (const auto& attempt : attempts_) {
+    attempt->is_too_long = attempt->is_too_long || attempt->http->received() > kMaxAnswerBytes;
     // A call has no effect before the socket exists, so the next pass calls it again.
-    if (stops_ || wall_seconds() >= attempt->deadline_s) attempt->http->stop();
+    if (stops_ || attempt->is_too_long || wall_seconds() >= attempt->deadline_s)
+      attempt->http->stop();
   }
 }
 
@@ -329,7 +333,10 @@ void Webhooks::record(Attempt& attempt) {
   ++changed.attempts;
   changed.status = attempt.status;
   changed.error = attempt.error;
-  if (attempt.status == 0 && attempt.end_s >= attempt.deadline_s)
+  if (attempt.status == 0 && attempt.is_too_long)
+    changed.error = "the answer has over " + std::to_string(kMaxAnswerBytes) +
+                    " bytes before the end of its headers";
+  else if (attempt.status == 0 && attempt.end_s >= attempt.deadline_s)
     changed.error = "no answer within " + number_text(options_.timeout_s) + " s";
   const std::string what = "webhook " + delivery.id + " of job " + delivery.job + ": attempt " +
                            std::to_string(changed.attempts) + " of " +

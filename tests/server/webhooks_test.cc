@@ -334,6 +334,20 @@ TEST_F(WebhookService, EndsSlowHandshakes) {
   stop();
 }
 
+// A header line without an end does not fill the memory of the service until the deadline.
+TEST_F(WebhookService, EndsAnswersThatAreTooLong) {
+  Receiver endless;
+  endless.begin_with("HTTP/1.1 204 No Content\r\nX-Long: " + std::string(400 << 10, 'x'));
+  config_.webhooks.allow.push_back(endless.url());
+  config_.webhooks.timeout_s = 300;
+  start_with_scene();
+  const std::string id = post_with(endless.url("/a"));
+  EXPECT_TRUE(until([&] { return job(id)["webhook"]["attempts"] >= 1; }));
+  EXPECT_NE(log().find("attempt 1 of 10 failed: the answer has over 262144 bytes"),
+            std::string::npos)
+      << log();
+}
+
 // If the service is killed after it has recorded the end of a job, but before it has stored the
 // delivery, the next service stores it. A third service delivers nothing again.
 TEST_F(WebhookService, DeliversEndsThatAKilledServiceRecorded) {

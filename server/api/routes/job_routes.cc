@@ -197,8 +197,9 @@ JobRequest read_job_request(Context& context, Call& call) {
   const auto permit = context.answers.wait();  // parsed JSON takes several times its text's memory
   JobRequest request = parse_job_request(body);
   if (request.text.size() > kMaxRequestBytes)
-    throw bad_request("scene, resolution and options have " + std::to_string(request.text.size()) +
-                      " bytes as JSON: expected at most " + std::to_string(kMaxRequestBytes));
+    throw bad_request("scene, resolution, options, labels and webhook have " +
+                      std::to_string(request.text.size()) + " bytes as JSON: expected at most " +
+                      std::to_string(kMaxRequestBytes));
   if (!request.webhook.empty()) context.webhooks.check(request.webhook);
   return request;
 }
