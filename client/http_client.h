@@ -57,8 +57,8 @@ class HttpClient {
   // may call it, also while the connection is being opened. It does not wait. It has no effect
   // before the socket exists, so callers repeat it until the request ends.
   void stop();
-  // Returns the number of bytes that the newest connection has received, with TLS and headers; 0 if
-  // there is none. Any thread may call it.
+  // Returns the number of bytes that the newest connection has received, with TLS and headers. The
+  // result is 0 before the first connection. Any thread may call it.
   uint64_t received() const;
 
   // Sends `size` bytes with PUT. source(offset, max_bytes) must return the bytes from `offset` on:

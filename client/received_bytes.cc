@@ -10,7 +10,7 @@ uint64_t received_bytes(int socket) {
   tcp_info info{};
   socklen_t size = sizeof info;
   if (getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return 0;
-  return info.tcpi_bytes_received;  // an old kernel writes fewer bytes, so it stays 0
+  return info.tcpi_bytes_received;  // 0 from an old kernel, which writes fewer bytes
 }
 
 }  // namespace voxdag::client
