@@ -27,12 +27,32 @@ class Interrupt : public CommandLine {
     kill(pid, signal);
     return wait_for(pid);
   }
+  // Starts `voxdag ARGS...` and sends the signal once is_ready() is true. If the program ends
+  // without an error before the signal, removes `output` and tries again, up to ten times. Returns
+  // the result of the last run.
+  template <class IsReady>
+  Answer interrupt_when(const IsReady& is_ready, int signal, const std::string& output,
+                        const std::vector<std::string>& args) {
+    Answer answer;
+    for (int attempt = 0; attempt < 10; ++attempt) {
+      put(".stderr", "");
+      const pid_t pid = start(args);
+      for (int i = 0; i < 30000 && !is_ready(); ++i) sleep_ms(1);
+      signal_s_ = voxdag::wall_seconds();
+      kill(pid, signal);
+      answer = wait_for(pid);
+      if (answer.status != 0) break;
+      std::filesystem::remove(folder_.file(output));
+    }
+    return answer;
+  }
   static void sleep_ms(int ms) {
     const timespec t{ms / 1000, ms % 1000 * 1000000};
     nanosleep(&t, nullptr);
   }
   const std::vector<std::string> args_ = {"build",  "s.glb",     "-r", "2048",        "-o",
                                           "s.vdag", "--threads", "1",  "--subvolume", "128"};
+  double signal_s_ = 0;  // time of the last signal of interrupt_when(), in wall_seconds()
 };
 
 // A build that SIGINT or SIGTERM interrupts exits with status 130 and leaves no output file. The
@@ -79,25 +99,16 @@ TEST_F(Interrupt, InsideAnImageDecoder) {
     "materials":[{"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}}],
     "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
     "nodes":[{"mesh":0}]})");
-  // The images are decoded after the stage `surfaces`. If the build ends before the signal, tries
-  // again.
-  Answer answer;
-  double waited_s = 0;
-  for (int attempt = 0; attempt < 10 && answer.status == 0; ++attempt) {
-    std::filesystem::remove(folder_.file("late.vdag"));
-    put(".stderr", "");
-    const pid_t pid =
-        start({"build", "late.gltf", "-r", "16", "-o", "late.vdag", "--color", "--memory", "1GiB"});
-    for (int i = 0; i < 30000 && contents(".stderr").find("surfaces") == std::string::npos; ++i)
-      sleep_ms(1);
+  const auto decodes = [&] {  // the images are decoded after the stage `surfaces`
+    if (contents(".stderr").find("surfaces") == std::string::npos) return false;
     sleep_ms(20);
-    const double start_s = voxdag::wall_seconds();
-    kill(pid, SIGTERM);
-    answer = wait_for(pid);
-    waited_s = voxdag::wall_seconds() - start_s;
-  }
+    return true;
+  };
+  const Answer answer = interrupt_when(
+      decodes, SIGTERM, "late.vdag",
+      {"build", "late.gltf", "-r", "16", "-o", "late.vdag", "--color", "--memory", "1GiB"});
   EXPECT_EQ(answer.status, 130) << answer.err;
-  EXPECT_LT(waited_s, 5);
+  EXPECT_LT(voxdag::wall_seconds() - signal_s_, 5);
 }
 
 // Stops extracts and exports after they have created their first file. A run may finish before its
@@ -109,19 +120,9 @@ class InterruptExport : public Interrupt {
     ASSERT_EQ(run({"build", "s.glb", "-r", "1024", "-o", "s.vdag"}).status, 0);
     std::signal(SIGHUP, SIG_DFL);  // the program that runs the tests can ignore SIGHUP
   }
-  // Runs the command and sends the signal once the file `first` exists. If the run ends before the
-  // signal, tries again, up to ten times. Returns the result of the last run.
+  // Sends the signal once the file `first` exists.
   Answer interrupt_at(const std::string& first, int signal, const std::vector<std::string>& args) {
-    Answer answer;
-    for (int attempt = 0; attempt < 10; ++attempt) {
-      const pid_t pid = start(args);
-      for (int i = 0; i < 10000 && !exists(first); ++i) sleep_ms(1);
-      kill(pid, signal);
-      answer = wait_for(pid);
-      if (answer.status != 0) break;
-      std::filesystem::remove(folder_.file("out"));
-    }
-    return answer;
+    return interrupt_when([&] { return exists(first); }, signal, "out", args);
   }
   size_t outputs() const {
     size_t count = 0;
