@@ -2,6 +2,7 @@
 
 #include "client/retry_policy.h"
 #include "core/base/error.h"
+#include "core/io/random_id.h"
 
 namespace voxdag::client {
 namespace {
@@ -71,7 +72,7 @@ Json ServiceClient::follow_job(const std::string& id,
 }
 
 std::string job_path(const std::string& id) {
-  if (id.size() != 16 || id.find_first_not_of("0123456789abcdef") != std::string::npos)
+  if (!is_random_id(id))
     throw Error(ErrorCode::kInvalidInput, "job '" + id + "': expected an id of 16 hex digits");
   return "/api/v1/jobs/" + id;
 }

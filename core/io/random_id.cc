@@ -17,4 +17,8 @@ std::string random_id() {
   return hex_text(bytes);
 }
 
+bool is_random_id(std::string_view text) {
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == text.npos;
+}
+
 }  // namespace voxdag

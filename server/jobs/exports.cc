@@ -26,10 +26,6 @@ constexpr unsigned kMaxExportInterruptions = 3;
 constexpr const char* kExpectedRetry =
     ": send the request again, and report the defect if it fails again";
 
-bool is_hex_id(const std::string& name) {
-  return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
-}
-
 void set_error(Export& it, const std::string& code, const std::string& message) {
   it.state = ExportState::kFailed;
   it.finished_s = unix_seconds();
@@ -107,7 +103,7 @@ Exports::Exports(const ServerConfig& config, FileSystem& files, JobQueue& queue,
                                                 : std::max(kMinMemory, default_memory() / 2)) {
   steps_.run("load the exports", [&] {
     for (const DirectoryEntry& entry : files_.list(jobs_path_))
-      if (entry.is_directory && is_hex_id(entry.name) && queue_.find(entry.name))
+      if (entry.is_directory && is_random_id(entry.name) && queue_.find(entry.name))
         steps_.run("load the exports of job " + entry.name, [&] { load(entry.name); });
   });
   thread_ = std::thread([this] {
@@ -132,7 +128,7 @@ void Exports::load(const std::string& job) {
   const std::string all = jobs_path_ + "/" + job + "/" + kExportsFolder;
   if (!files_.exists(all)) return;
   for (const DirectoryEntry& entry : files_.list(all))
-    if (entry.is_directory && is_hex_id(entry.name))
+    if (entry.is_directory && is_random_id(entry.name))
       steps_.run("load export " + entry.name + " of job " + job,
                  [&] { load_one(job, entry.name); });
 }

@@ -1,6 +1,7 @@
 #include "server/jobs/job_folders.h"
 
 #include "core/base/clock.h"
+#include "core/io/random_id.h"
 #include "scheduler/cluster/cluster.h"
 #include "server/jobs/process/job_process.h"
 #include "server/jobs/protocol/job_task.h"
@@ -9,15 +10,11 @@
 namespace voxdag::server {
 namespace {
 
-bool is_job_id(const std::string& name) {
-  return name.size() == 16 && name.find_first_not_of("0123456789abcdef") == std::string::npos;
-}
-
 // Returns the id of a job from the name of a folder that a deletion has renamed; "" for other
 // folders.
 std::string marked_job(const DirectoryEntry& entry) {
   const std::string id = entry.name.substr(0, entry.name.find('.'));
-  return entry.is_directory && is_job_id(id) && entry.name == id + kDeleted ? id : "";
+  return entry.is_directory && is_random_id(id) && entry.name == id + kDeleted ? id : "";
 }
 
 }  // namespace
@@ -30,7 +27,7 @@ JobFolders::JobFolders(const std::string& path, FileSystem& files, JobQueue& que
 
 void JobFolders::adopt() {
   for (const DirectoryEntry& entry : files_.list(path_)) {
-    if (!entry.is_directory || !is_job_id(entry.name) || queue_.find(entry.name)) continue;
+    if (!entry.is_directory || !is_random_id(entry.name) || queue_.find(entry.name)) continue;
     steps_.run("adopt job " + entry.name, [&] {
       const JobFolder place = of(entry.name);
       const JobRequest request = parse_job_request(read_task(files_, place.task()).request);

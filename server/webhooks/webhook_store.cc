@@ -84,9 +84,8 @@ void WebhookStore::add(const Delivery& delivery) {
   put_row(database_, "delivery", delivery);
   database_
       .prepare(
-          "DELETE FROM delivery WHERE job = ?1 AND event <= (SELECT event FROM delivery WHERE job "
-          "= "
-          "?1 ORDER BY event DESC LIMIT 1 OFFSET ?2)")
+          "DELETE FROM delivery WHERE job = ?1 AND event <= (SELECT event FROM delivery "
+          "WHERE job = ?1 ORDER BY event DESC LIMIT 1 OFFSET ?2)")
       .bind(0, delivery.job)
       .bind(1, kMaxDeliveriesPerJob)
       .run();
