@@ -154,7 +154,8 @@ void Exports::load_one(const std::string& job, const std::string& id) {
                     " times while this export ran, perhaps because of it");
     write_record(it);
   }
-  jobs_[job][id] = {it, next_turn_++, false, nullptr};
+  jobs_[job][id] = {it, false, nullptr};
+  next_turn_ = std::max(next_turn_, it.turn.value_or(0) + 1);
 }
 
 void Exports::write_record(const Export& it) {
@@ -238,6 +239,7 @@ Exports::Added Exports::add(const std::string& job, const std::string& request,
   }
   queue_again(it);
   it.interruptions = 0;
+  it.turn = next_turn_++;
   files_.make_directories(folder(it));
   try {
     write_record(it);
@@ -248,7 +250,6 @@ Exports::Added Exports::add(const std::string& job, const std::string& request,
   // An export that has just failed can still be busy. It remains so until its files are removed.
   Entry& entry = known ? *known : jobs_[job][it.id];
   entry.it = it;
-  entry.turn = next_turn_++;
   changed_.notify_all();
   return {it, true};
 }
@@ -270,6 +271,15 @@ std::vector<Export> Exports::list(const std::string& job) const {
 Export Exports::find(const std::string& job, const std::string& id) const {
   std::lock_guard lock(mutex_);
   return entry_in(jobs_, job, id).it;
+}
+
+Exports::Statistics Exports::statistics() const {
+  std::lock_guard lock(mutex_);
+  Statistics statistics = ended_;
+  for (const auto& [job, entries] : jobs_)
+    for (const auto& [id, entry] : entries)
+      ++statistics.exports[static_cast<size_t>(entry.it.state)];
+  return statistics;
 }
 
 std::shared_ptr<LiveJob> Exports::live(const std::string& id) const {
@@ -322,7 +332,7 @@ Exports::Entry* Exports::next_ready() {
   for (auto& [job, entries] : jobs_) {
     if (paused_.contains(job)) continue;
     for (auto& [id, entry] : entries)
-      if (entry.it.state == ExportState::kQueued && (!next || entry.turn < next->turn))
+      if (entry.it.state == ExportState::kQueued && (!next || entry.it.turn < next->it.turn))
         next = &entry;
   }
   return next;
@@ -349,6 +359,7 @@ void Exports::run() {
 
 void Exports::run_one(Entry& entry, std::unique_lock<std::mutex>& lock) {
   const auto live = std::make_shared<LiveJob>(memory_bytes_);
+  const double start_s = wall_seconds();
   entry.live = live;
   entry.is_busy = true;
   entry.it.state = ExportState::kRunning;
@@ -377,7 +388,7 @@ void Exports::run_one(Entry& entry, std::unique_lock<std::mutex>& lock) {
   } catch (const Error& error) {
     set_error(entry.it, error_name(error.code()), error.message());
   }
-  finish(entry, lock);
+  finish(entry, wall_seconds() - start_s, lock);
 }
 
 ChildProcess::End Exports::run_process(const Export& it, LiveJob& live) {
@@ -396,10 +407,13 @@ ChildProcess::End Exports::run_process(const Export& it, LiveJob& live) {
       live, config_.jobs.stop_timeout_s, kNoExportLimitS, [] {});
 }
 
-void Exports::finish(Entry& entry, std::unique_lock<std::mutex>& lock) {
+void Exports::finish(Entry& entry, double wall_s, std::unique_lock<std::mutex>& lock) {
   const Export it = entry.it;
   log_("export " + it.id + " of job " + it.job + " " + name_of(it.state) +
        (it.error_code.empty() ? "" : ": " + it.error_code));
+  ++ended_.ended_runs[static_cast<size_t>(it.state)];
+  for (const ExportedFile& file : it.result.files) ended_.ended_bytes += file.bytes;
+  ended_.ended_wall_s += wall_s;
   if (it.state == ExportState::kFailed || it.state == ExportState::kQueued) {
     lock.unlock();
     steps_.run("remove the files of export " + it.id, [&] { clear(it); });

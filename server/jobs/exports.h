@@ -9,6 +9,7 @@
 // part of the folder of the job, so it is deleted with the job.
 #pragma once
 
+#include <array>
 #include <condition_variable>
 #include <map>
 #include <memory>
@@ -61,6 +62,14 @@ class Exports {
   // is in the state deleting when the call returns. Returns whether the export is deleted. Throws
   // RequestError: kNotFound, or kConflict if the job is being deleted.
   bool remove(const std::string& job, const std::string& id);
+  // For /metrics. The members `ended_*` count since the start of the service.
+  struct Statistics {
+    std::array<uint64_t, 5> exports{};     // current number of exports, by state
+    std::array<uint64_t, 5> ended_runs{};  // by the state of the export after the run
+    uint64_t ended_bytes = 0;              // size of the files of the runs that succeeded
+    double ended_wall_s = 0;               // wall time of all ended runs
+  };
+  Statistics statistics() const;
   // Returns null unless the process of the export is running.
   std::shared_ptr<LiveJob> live(const std::string& id) const;
   // Returns the path of a file of the export.
@@ -84,7 +93,6 @@ class Exports {
  private:
   struct Entry {
     Export it;
-    uint64_t turn = 0;  // a smaller number runs earlier
     // A thread runs this export or removes its files. Only this thread may remove the entry.
     bool is_busy = false;
     std::shared_ptr<LiveJob> live;  // while its process runs
@@ -105,9 +113,9 @@ class Exports {
   // Runs an export to its end. Unlocks the mutex in between.
   void run_one(Entry& entry, std::unique_lock<std::mutex>& lock);
   ChildProcess::End run_process(const Export& it, LiveJob& live);
-  // Records the end of an export, or removes the export if a request has deleted it. Unlocks the
-  // mutex in between.
-  void finish(Entry& entry, std::unique_lock<std::mutex>& lock);
+  // Records the end of an export that ran for `wall_s` seconds, or removes the export if a request
+  // has deleted it. Unlocks the mutex in between.
+  void finish(Entry& entry, double wall_s, std::unique_lock<std::mutex>& lock);
   // Removes the files and the entry of a busy export. Unlocks the mutex in between.
   void remove_busy(Entry& entry, std::unique_lock<std::mutex>& lock);
   void check_not_paused(const std::string& job) const;
@@ -125,6 +133,7 @@ class Exports {
   std::map<std::string, Entries> jobs_;  // keyed by job
   std::set<std::string> paused_;         // jobs with a Pause
   uint64_t next_turn_ = 1;
+  Statistics ended_;  // only the members `ended_*`
   bool stops_ = false;
   std::thread thread_;
 };

@@ -151,6 +151,10 @@ std::string Webhooks::job_member(const Job& job) {
   return json_text(json);
 }
 
+Webhooks::Statistics Webhooks::statistics() {
+  return {store_.pending_count(), ended_attempts_, delivered_, failed_};
+}
+
 void Webhooks::stop() {
   stops_ = true;
   queue_.announce();
@@ -218,6 +222,7 @@ void Webhooks::collect(const JobEnd& end) {
     log_("webhook " + delivery.id + " of job " + delivery.job + " failed: " + delivery.error);
   }
   store_.add(delivery);
+  count_end(delivery);
   looks_ = true;
 }
 
@@ -353,7 +358,14 @@ void Webhooks::record(Attempt& attempt) {
         now + std::min(options_.max_backoff_s, options_.backoff_s * std::exp2(exponent));
   }
   store_.update(changed);
+  ++ended_attempts_;
+  count_end(changed);
   if (!changed.error.empty()) log_(what + " failed: " + changed.error);
+}
+
+void Webhooks::count_end(const Delivery& delivery) {
+  if (delivery.state == DeliveryState::kDelivered) ++delivered_;
+  if (delivery.state == DeliveryState::kFailed) ++failed_;
 }
 
 void Webhooks::fail(Delivery delivery, const std::string& reason) {
@@ -361,6 +373,7 @@ void Webhooks::fail(Delivery delivery, const std::string& reason) {
   delivery.ended_s = unix_seconds();
   delivery.error = reason;
   store_.update(delivery);
+  count_end(delivery);
   log_("webhook " + delivery.id + " of job " + delivery.job + " failed: " + reason);
 }
 

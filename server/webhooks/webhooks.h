@@ -37,6 +37,11 @@ class Webhooks {
   void check(const std::string& url) const;
   // Returns the member "webhook" of JOB (docs/api.md) as JSON; "null" if the job has none.
   std::string job_member(const Job& job);
+  // For /metrics. All members except `pending` count since the start of the service.
+  struct Statistics {
+    uint64_t pending = 0, attempts = 0, delivered = 0, failed = 0;
+  };
+  Statistics statistics();
   // Starts no more attempts, and ends attempts in progress. They are repeated by the next service.
   // Waits for the resolution of host names in progress, which cannot be ended.
   void stop();
@@ -58,6 +63,8 @@ class Webhooks {
   void end_overdue_attempts();
   void record_ended_attempts();
   void record(Attempt& attempt);
+  // Counts a delivery that has ended.
+  void count_end(const Delivery& delivery);
   void fail(Delivery delivery, const std::string& reason);
   void forget_deleted_jobs();
   double max_wait_s() const;
@@ -71,6 +78,7 @@ class Webhooks {
   EndedJobs ended_jobs_;
   WebhookStore store_;
   std::atomic<bool> stops_{false};
+  std::atomic<uint64_t> ended_attempts_{0}, delivered_{0}, failed_{0};
 
   // Used only by thread_.
   std::list<std::unique_ptr<Attempt>> attempts_;

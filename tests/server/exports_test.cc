@@ -8,6 +8,8 @@
 namespace voxdag::server {
 namespace {
 
+using namespace std::string_literals;
+
 class ServiceExports : public RunningService {
  protected:
   // Makes the processes of exports wait until go().
@@ -115,6 +117,20 @@ TEST_F(ServiceExports, HaveTheBytesOfLocalExports) {
     EXPECT_EQ(Json::parse(again.body)["id"], done["id"]);
   }
   EXPECT_EQ(shown(exports_of(id))["exports"].size(), cases.size());
+
+  uint64_t bytes = 0;
+  const Json all = shown(exports_of(id));
+  for (const Json& each : all["exports"])
+    for (const Json& file : each["files"]) bytes += file["bytes"].get<uint64_t>();
+  const std::string metrics = http_->get("/metrics").body;
+  for (const std::string& line :
+       {"# TYPE voxdag_exports gauge\nvoxdag_exports{state=\"queued\"} 0\n"
+        "voxdag_exports{state=\"running\"} 0\nvoxdag_exports{state=\"deleting\"} 0\n"
+        "voxdag_exports{state=\"failed\"} 0\nvoxdag_exports{state=\"succeeded\"} 4\n"s,
+        "voxdag_export_runs_total{state=\"failed\"} 0\n"s,
+        "voxdag_export_runs_total{state=\"succeeded\"} 4\n"s,
+        "voxdag_exported_bytes_total " + std::to_string(bytes) + "\n"})
+    EXPECT_NE(metrics.find(line), std::string::npos) << line << "is not in\n" << metrics;
 }
 
 TEST_F(ServiceExports, RefuseWrongRequests) {
@@ -215,6 +231,31 @@ TEST_F(ServiceExports, ContinueAfterARestart) {
   stop();
   start();
   EXPECT_EQ(shown(running)["state"], "succeeded") << "complete exports are kept";
+}
+
+// Queued exports run in the order of their requests, also after two restarts. The ids, which are
+// the names of the exports' folders, have another order.
+TEST_F(ServiceExports, KeepTheirOrderAfterARestart) {
+  hold_exports();
+  start();
+  const std::string id = finished_job();
+  std::vector<std::string> paths;
+  for (const int level : {6, 2, 5, 3, 4})
+    for (const char* format : {"npz", "ply"})
+      paths.push_back(queued_export(id, {{"to", format}, {"level", level}}));
+  ASSERT_TRUE(until_held());
+  stop();
+  start();
+  stop();
+  go();
+  start();
+  std::string previous;
+  for (const std::string& path : paths) {
+    const Json done = ended(path);
+    ASSERT_EQ(done["state"], "succeeded") << done.dump(2);
+    EXPECT_LT(previous, done["started_at"].get<std::string>()) << done.dump(2);
+    previous = done["started_at"];
+  }
 }
 
 // After a kill, the record says that the export runs, and a part of its file may exist. The next

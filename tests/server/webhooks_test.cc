@@ -239,6 +239,12 @@ TEST_F(WebhookService, RetriesUntilAReceiverAccepts) {
   EXPECT_EQ(webhook["error"], "status 500: expected 200 to 299");
   EXPECT_EQ(receiver_.received().size(), 6u);
   EXPECT_NE(log().find("attempt 3 of 3 failed: status 500"), std::string::npos) << log();
+  const std::string metrics = http_->get("/metrics").body;
+  for (const char* line :
+       {"voxdag_webhook_pending_deliveries 0\n", "voxdag_webhook_attempts_total 6\n",
+        "voxdag_webhook_deliveries_total{state=\"delivered\"} 1\n"
+        "voxdag_webhook_deliveries_total{state=\"failed\"} 1\n"})
+    EXPECT_NE(metrics.find(line), std::string::npos) << line << "is not in\n" << metrics;
 }
 
 TEST_F(WebhookService, RefusesUrlsThatAreNotAllowed) {

@@ -69,7 +69,7 @@ std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
   for (const auto& [state, count] : runs_)
     out << "voxdag_job_runs_total{state=\"" << state << "\"} " << count << '\n';
   const auto add = [&](const char* name, const char* help, auto value) {
-    samples.push_back({name, help, static_cast<double>(value)});
+    samples.push_back({name, help, static_cast<double>(value), ""});
   };
   add("voxdag_built_voxels_total", "Voxels of succeeded jobs.", voxels_);
   add("voxdag_built_bytes_total", "File bytes of succeeded jobs.", result_bytes_);
@@ -77,9 +77,13 @@ std::string Metrics::text(const std::map<JobState, uint64_t>& jobs,
   add("voxdag_build_cpu_seconds_total", "CPU time of succeeded jobs.", build_cpu_s_);
   add("voxdag_uploaded_bytes_total", "Received bytes of scenes.", uploaded_bytes_.load());
   add("voxdag_downloaded_bytes_total", "Requested bytes of results.", downloaded_bytes_.load());
-  for (const auto& [name, help, value] : samples) {
-    write_header(out, name, std::string_view(name).ends_with("_total") ? "counter" : "gauge", help);
-    out << name << ' ' << value << '\n';
+  std::string_view previous;
+  for (const auto& [name, help, value, labels] : samples) {
+    const std::string_view current = name;
+    if (current != previous)
+      write_header(out, name, current.ends_with("_total") ? "counter" : "gauge", help);
+    previous = current;
+    out << name << (labels.empty() ? "" : "{" + labels + "}") << ' ' << value << '\n';
   }
   return out.str();
 }

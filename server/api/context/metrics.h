@@ -14,10 +14,12 @@
 namespace voxdag::server {
 
 // A value measured when /metrics is read: a counter if its name ends with _total, else a gauge.
+// Samples of one name with different labels must be neighbors.
 struct Sample {
   const char* name;
   const char* help;
   double value;
+  std::string labels = "";  // such as: state="queued"
 };
 
 class Metrics {

@@ -68,10 +68,34 @@ Response get_ready(Context& context, WriteProbe& probe) {
   return json_response(200, "{\"status\":\"ready\"}");
 }
 
+std::string state_label(const char* state) { return "state=\"" + std::string(state) + "\""; }
+
+void add_exports(const auto& add, const Exports::Statistics& exports) {
+  for (size_t i = 0; i < exports.exports.size(); ++i)
+    add("voxdag_exports", "Exports of jobs' results by state.", exports.exports[i],
+        state_label(name_of(static_cast<ExportState>(i))));
+  for (const ExportState state : {ExportState::kQueued, ExportState::kDeleting,
+                                  ExportState::kFailed, ExportState::kSucceeded})
+    add("voxdag_export_runs_total", "Ended runs of exports by the state they left the export in.",
+        exports.ended_runs[static_cast<size_t>(state)], state_label(name_of(state)));
+  add("voxdag_exported_bytes_total", "File bytes of succeeded exports.", exports.ended_bytes);
+  add("voxdag_export_wall_seconds_total", "Wall time of ended runs of exports.",
+      exports.ended_wall_s);
+}
+
+void add_webhooks(const auto& add, const Webhooks::Statistics& webhooks) {
+  add("voxdag_webhook_pending_deliveries", "Deliveries of webhooks that have not ended.",
+      webhooks.pending);
+  add("voxdag_webhook_attempts_total", "Ended attempts to deliver a webhook.", webhooks.attempts);
+  constexpr const char* kHelp = "Ended deliveries of webhooks by their final state.";
+  add("voxdag_webhook_deliveries_total", kHelp, webhooks.delivered, state_label("delivered"));
+  add("voxdag_webhook_deliveries_total", kHelp, webhooks.failed, state_label("failed"));
+}
+
 Response get_metrics(Context& context, double started_s) {
   std::vector<Sample> samples;
-  const auto add = [&](const char* name, const char* help, auto value) {
-    samples.push_back({name, help, static_cast<double>(value)});
+  const auto add = [&](const char* name, const char* help, auto value, std::string labels = "") {
+    samples.push_back({name, help, static_cast<double>(value), std::move(labels)});
   };
   add("voxdag_job_processes", "Running job processes.", context.dispatcher.running());
   add("voxdag_event_streams", "Open event streams.", context.event_streams.in_use());
@@ -89,6 +113,8 @@ Response get_metrics(Context& context, double started_s) {
   add("voxdag_cluster_nodes", "Nodes of the cluster on which tasks run.", tasks.running.size());
   add("voxdag_cluster_failed_attempts", "Failed attempts of the batches of running jobs.",
       tasks.failed_attempts);
+  add_exports(add, context.dispatcher.exports().statistics());
+  add_webhooks(add, context.webhooks.statistics());
   add("voxdag_resident_memory_bytes", "Resident memory of the service without its jobs.",
       resident_bytes());
   add("voxdag_cpu_seconds_total", "CPU time of the service without its jobs.",

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,10 @@ struct Export {
   std::string id;
   std::string job;
   ExportState state = ExportState::kQueued;
-  std::string request;         // text of an ExportSpec
-  std::string output;          // name of the (first) file
+  std::string request;  // text of an ExportSpec
+  std::string output;   // name of the (first) file
+  // A queued export with a smaller number runs earlier. Records of earlier versions have no number.
+  std::optional<uint64_t> turn;
   unsigned interruptions = 0;  // number of consecutive runs that ended because the service ended
   // Unix times in seconds; 0: never.
   double created_s = 0, started_s = 0, finished_s = 0;
@@ -64,6 +67,7 @@ void fields(Visitor& visit, Export& e) {
   visit("state", e.state);
   visit("request", e.request);
   visit("output", e.output);
+  visit("turn", e.turn);
   visit("interruptions", e.interruptions);
   visit("created_s", e.created_s);
   visit("started_s", e.started_s);
