@@ -165,5 +165,6 @@ void add_watch_command(CommandLine& line);
 // Adds `cancel`, `suspend` and `resume`.
 void add_job_action_commands(CommandLine& line);
 void add_download_command(CommandLine& line);
+void add_exports_command(CommandLine& line);
 
 }  // namespace voxdag::cli

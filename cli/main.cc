@@ -56,7 +56,7 @@ int run(int argc, char** argv) {
 #ifdef VOXDAG_HAS_SERVER
            add_serve_commands,      add_health_command,     add_submit_command,
            add_jobs_command,        add_watch_command,      add_job_action_commands,
-           add_download_command,
+           add_download_command,    add_exports_command,
 #endif
            add_version_command,
        })

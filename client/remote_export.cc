@@ -2,9 +2,12 @@
 
 #include "client/retry_policy.h"
 #include "core/base/error.h"
+#include "core/io/random_id.h"
 
 namespace voxdag::client {
 namespace {
+
+std::string exports_path(const std::string& job) { return job_path(job) + "/exports"; }
 
 constexpr double kExportPollIntervalS = 0.5;
 
@@ -57,7 +60,7 @@ class ProgressRelay {
 
 Json make_export(ServiceClient& service, const std::string& job, const Json& request,
                  Progress& progress) {
-  const std::string all = job_path(job) + "/exports";
+  const std::string all = exports_path(job);
   Json it = service.post(all, request);
   const std::string id = it.at("id");
   try {
@@ -74,9 +77,19 @@ Json make_export(ServiceClient& service, const std::string& job, const Json& req
   }
 }
 
+Json exports_of(ServiceClient& service, const std::string& job) {
+  return service.get(exports_path(job)).at("exports");
+}
+
+bool delete_export(ServiceClient& service, const std::string& job, const std::string& id) {
+  if (!is_random_id(id))
+    throw Error(ErrorCode::kInvalidInput, "export '" + id + "': expected an id of 16 hex digits");
+  return service.remove(exports_path(job) + "/" + id);
+}
+
 std::vector<RemoteFile> files_of_export(const Json& exported) {
   const std::string path =
-      job_path(exported.at("job")) + "/exports/" + exported.at("id").get<std::string>() + "/files/";
+      exports_path(exported.at("job")) + "/" + exported.at("id").get<std::string>() + "/files/";
   std::vector<RemoteFile> files;
   for (const Json& file : exported.at("files"))
     files.push_back({path + std::to_string(files.size()), file.at("bytes"), file.at("sha256")});

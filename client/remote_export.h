@@ -17,6 +17,13 @@ namespace voxdag::client {
 Json make_export(ServiceClient& service, const std::string& job, const Json& request,
                  Progress& progress);
 
+// Returns the exports of a job as a list of EXPORT, oldest first.
+Json exports_of(ServiceClient& service, const std::string& job);
+
+// Deletes an export and its files. Returns false if the server first stops its process. Throws
+// Error{kInvalidInput} unless `id` is 16 hex digits.
+bool delete_export(ServiceClient& service, const std::string& job, const std::string& id);
+
 // Returns the files of an EXPORT.
 std::vector<RemoteFile> files_of_export(const Json& exported);
 

@@ -51,6 +51,38 @@ Json ServiceClient::post(const std::string& path, const Json& body, const Header
                      }).body);
 }
 
+bool ServiceClient::remove(const std::string& path) {
+  return send_with_retries([&](HttpClient& http) {
+           return http.send("DELETE", path, "");
+         }).status != 202;
+}
+
+std::string ServiceClient::full_id(const std::string& text) {
+  if (is_random_id(text)) return text;
+  if (text.empty() || text.size() > 16 ||
+      text.find_first_not_of("0123456789abcdef") != std::string::npos)
+    throw Error(ErrorCode::kInvalidInput,
+                "job '" + text + "': expected an id of 16 hex digits, or its first digits");
+  std::string found;
+  for (std::string cursor = "&limit=200"; !cursor.empty();) {
+    const Json page = get("/api/v1/jobs?q=" + text + cursor);
+    for (const Json& job : page.at("jobs")) {
+      const std::string id = job.at("id");
+      if (!id.starts_with(text)) continue;  // the text is in the job's name, scenes or labels
+      if (!found.empty())
+        throw Error(ErrorCode::kInvalidInput, "job '" + text + "': the ids " + found + " and " +
+                                                  id + " begin with it: expected more digits");
+      found = id;
+    }
+    const Json& next = page.at("next_cursor");
+    cursor = next.is_string() ? "&limit=200&cursor=" + next.get<std::string>() : "";
+  }
+  if (found.empty())
+    throw Error(ErrorCode::kNotFound,
+                "job '" + text + "': no id begins with it: expected the id of an existing job");
+  return found;
+}
+
 Json ServiceClient::job(const std::string& id) { return get(job_path(id)); }
 
 Json ServiceClient::post_action(const std::string& id, const std::string& action) {

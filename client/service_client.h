@@ -28,6 +28,11 @@ class ServiceClient {
 
   Json get(const std::string& path);
   Json post(const std::string& path, const Json& body, const HeaderMap& headers = {});
+  // Deletes a resource. Returns false if the service deletes it later.
+  bool remove(const std::string& path);
+  // Returns the id of the job whose id begins with `text`. Throws Error: kInvalidInput if `text` is
+  // not hexadecimal or several ids begin with it, kNotFound if none does.
+  std::string full_id(const std::string& text);
   // Returns a job as the JSON object that docs/api.md calls JOB.
   Json job(const std::string& id);
   // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the JOB after the action.

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "merge/checkpoint/merge_recovery.h"
 #include "merge/pass/merge_pass.h"
 #include "merge/plan/pending_artifacts.h"
@@ -82,7 +83,7 @@ class Merger {
                                                   "rows,"
                                                 : "any two neighboring subvolumes") +
                       " takes more than " + std::to_string(context_.budget.available()) +
-                      " bytes: expected more memory (--memory)");
+                      " bytes: expected more memory (" + option_text("memory") + ")");
     }
     PassSegment& segment =
         pending_.add_segment(std::make_unique<PassSegment>(context_.scratch, context_.budget));

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "cli/option_fields.h"
 #include "cli/output.h"
 #include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
@@ -17,7 +18,7 @@ namespace voxdag::cli {
 namespace {
 
 struct ExportCommand {
-  std::string input, format, output, memory, up;
+  std::string input, format, output, memory;
   SelectionOptions selection;
   query::ExportOptions options;
   uint64_t chunks = 0, levels = 1;
@@ -72,8 +73,7 @@ void run(const ExportCommand& command, CommandContext& context) {
   request.gray = command.gray;
   request.replace = command.force;
   request.options = command.options;
-  if (!command.up.empty())
-    request.options.up = command.up == "z" ? query::UpAxis::kZ : query::UpAxis::kY;
+  with_option_names([&] { query::check_export_options(*request.format, request.options); });
   const auto progress = make_progress_bar(command.quiet);
   const auto file = open_global_file(command.input);
   request.selection = command.selection.selection(*file);
@@ -113,18 +113,8 @@ void declare(Command& command, ExportCommand& state) {
   command.option("--memory", state.memory,
                  "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
-  command
-      .option("--up", state.up,
-              "axis of the exported file that gets the y axis of the scene (default: z for vox, "
-              "otherwise y)")
-      .one_of({"y", "z"});
-  command.option("--grid", state.options.grid,
-                 "vdb, nvdb: density (default), a fog volume; mask, which is smaller; or sdf, the "
-                 "distance to the surface of a solid");
-  command
-      .option("--band", state.options.band,
-              "N: with --grid sdf: distances up to N voxels from the surface, 1 to 16 (default: 3)")
-      .positive();
+  OptionDeclarer declarer(command, Scope::kSubmit);
+  fields(declarer, state.options);
   const Option chunks_option =
       command
           .option("--chunks", state.chunks,
@@ -137,13 +127,6 @@ void declare(Command& command, ExportCommand& state) {
               "(default: 1)")
       .positive()
       .needs(chunks_option);
-  command.flag("--compact", state.options.compact,
-               "npz: leave out the arrays that can be computed from the others");
-  command.flag("--outside", state.options.outside,
-               "glb: write only the faces that are visible from outside, not those around enclosed "
-               "space");
-  command.flag("--watertight", state.options.watertight,
-               "glb: write a closed mesh: triangles meet at common edges and vertices");
   command.flag("--force", state.force, "replace existing files");
   command.quiet_flag(state.quiet);
   command.json_flag(state.json);

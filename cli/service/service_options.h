@@ -29,15 +29,20 @@ class ServiceOptions {
 
 // Adds a client command, as add_command() adds other commands. `State` has a member `service` of
 // the type ServiceOptions. The caller's file must define run(state, client, context). `client` is
-// connected to the server that the options name.
+// connected to the server that the options name. Users can shorten the job ids in the members `id`
+// and `ids` of `State`; run() gets the complete ids.
 template <class State>
 State& add_service_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);
   const auto state = std::make_shared<State>();
   declare(command, *state);
   command.on_run([state, &line] {
-    state->service.with_service(
-        line.context(), [&](ServiceClient& service) { run(*state, service, line.context()); });
+    state->service.with_service(line.context(), [&](ServiceClient& service) {
+      if constexpr (requires { state->id; }) state->id = service.full_id(state->id);
+      if constexpr (requires { state->ids; })
+        for (std::string& id : state->ids) id = service.full_id(id);
+      run(*state, service, line.context());
+    });
   });
   return *state;
 }

@@ -7,6 +7,7 @@
 #include "cli/service/job_text.h"
 #include "cli/terminal/progress_bar.h"
 #include "client/scene_upload.h"
+#include "core/base/text/printable.h"
 #include "core/fields/json_fields.h"
 #include "core/io/random_id.h"
 #include "server/jobs/protocol/job_request.h"
@@ -58,7 +59,9 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
   // second job.
   const std::string key = random_id() + random_id();
   Json job = service.post("/api/v1/jobs", body, {{"Idempotency-Key", key}});
-  if (!command.json) std::printf("%s\n", state_line(job).c_str());
+  if (!command.json)
+    std::printf("%s\n%s/#/jobs/%s\n", state_line(job).c_str(), service.url().c_str(),
+                printable_line(job.at("id").get<std::string>()).c_str());
   std::fflush(stdout);
   if (command.wait) job = follow_job(service, job.at("id"), command.quiet);
   if (command.json) print_json(job);

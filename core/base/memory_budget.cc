@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 
 namespace voxdag {
@@ -35,7 +36,7 @@ void MemoryBudget::charge(uint64_t bytes, std::string_view what) {
   throw Error(ErrorCode::kOutOfMemory,
               "out of memory: " + std::string(what) + " needs " + size_text(bytes) + ", but only " +
                   size_text(available()) + " of the budget of " + size_text(limit_) +
-                  " are free: expected a larger memory budget (--memory)");
+                  " are free: expected a larger memory budget (" + option_text("memory") + ")");
 }
 
 void MemoryBudget::release(uint64_t bytes) {

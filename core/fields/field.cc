@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/base/options/option_text.h"
 #include "core/base/text/printable.h"
 
 namespace voxdag {
@@ -46,11 +47,7 @@ size_t character_count(std::string_view text) {
       text, [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
 }
 
-std::string option_name(const char* field_name) {
-  std::string option = std::string("--") + field_name;
-  std::ranges::replace(option, '_', '-');
-  return option;
-}
+std::string option_name(const char* field_name) { return spell_for_command_line(field_name, {}); }
 
 std::string expected_integer(const Field& field, const std::string& low, const std::string& high) {
   if (field.is_bytes)

@@ -65,10 +65,13 @@ FieldJson difference(const FieldJson& options, const FieldJson& defaults) {
   return given;
 }
 
-void Decoder::refuse_unknown_members(const std::string& where) const {
+void Decoder::refuse_unknown_members(
+    const std::string& where,
+    const std::function<std::string(const std::string& name)>& suggest) const {
   for (const auto& [name, value] : object_.items())
     if (std::ranges::find(known_, name) == known_.end())
-      refuse(name.substr(0, 64), "a documented member of " + where + "; this member is unknown");
+      refuse(name.substr(0, 64), "a documented member of " + where + "; this member is unknown" +
+                                     (suggest ? suggest(name) : ""));
 }
 
 }  // namespace voxdag::json_fields

@@ -165,6 +165,38 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
   expect(fits(field, value));
 }
 
+// A visitor that finds members of nested objects by their name.
+class NestedMemberFinder {
+ public:
+  explicit NestedMemberFinder(std::string name) : name_(std::move(name)) {}
+
+  template <class T>
+  void operator()(const Field& field, T& value) {
+    if constexpr (Described<T>)
+      enter(field.name, [&] { fields(*this, value); });
+    else if (field.name == name_)
+      path_ = prefix_ + name_;
+  }
+  void object(const char* name, const auto& visit_members) {
+    enter(name, [&] { visit_members(*this); });
+  }
+  void derived(const char*, const auto&) {}
+
+  // Returns the path of the member, such as "options.color", or "" if there is none.
+  const std::string& path() const { return path_; }
+
+ private:
+  void enter(const std::string& object, const auto& visit) {
+    const std::string outer = prefix_;
+    prefix_ += object + ".";
+    visit();
+    prefix_ = outer;
+  }
+
+  const std::string name_;
+  std::string prefix_, path_;
+};
+
 // A visitor that sets the members of a struct from a JSON object. Throws FieldError.
 class Decoder {
  public:
@@ -196,7 +228,10 @@ class Decoder {
 
   // Throws FieldError if the object has a member that the struct does not have. `where` is the name
   // of the object in the message.
-  void refuse_unknown_members(const std::string& where) const;
+  // `suggest(name)` returns the end of the message: a phrase that names a similar member, or "".
+  void refuse_unknown_members(
+      const std::string& where,
+      const std::function<std::string(const std::string& name)>& suggest = nullptr) const;
 
  private:
   const FieldJson& object_;
@@ -208,7 +243,13 @@ template <class T>
 void decode(const FieldJson& json, const std::string& name, Members members, T& value) {
   Decoder decoder(json, name, members);
   fields(decoder, value);
-  if (members == Members::kGiven) decoder.refuse_unknown_members(name);
+  if (members == Members::kGiven)
+    decoder.refuse_unknown_members(name, [](const std::string& unknown) {
+      NestedMemberFinder finder(unknown);
+      T defaults;
+      fields(finder, defaults);
+      return finder.path().empty() ? "" : "; did you mean '" + finder.path() + "'?";
+    });
 }
 
 }  // namespace json_fields

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/fields/json_fields.h"
 #include "core/format/global/open_global.h"
 #include "core/io/file_system.h"
 #include "python/native/bindings.h"
@@ -66,19 +67,6 @@ std::string extract(const PathText& path, const PathText& output, uint32_t grid_
   });
 }
 
-query::ExportOptions export_options(const nlohmann::json& given) {
-  query::ExportOptions options;
-  const std::string up = given.value("up", "");
-  if (up == "y") options.up = query::UpAxis::kY;
-  if (up == "z") options.up = query::UpAxis::kZ;
-  options.grid = given.value("grid", "");
-  options.band = given.value("band", 0);
-  options.compact = given.value("compact", false);
-  options.outside = given.value("outside", false);
-  options.watertight = given.value("watertight", false);
-  return options;
-}
-
 nlohmann::json facts_json(const query::ExportReport& report) {
   auto facts = nlohmann::json::object();
   for (const auto& [name, numbers] : report.facts)
@@ -91,7 +79,7 @@ std::string export_file(const PathText& path, const PathText& output, const std:
                         const std::string& memory, bool gray, bool replace,
                         const std::string& options_text, nb::object progress) {
   query::ExportRequest request;
-  request.options = export_options(nlohmann::json::parse(options_text));
+  set_options(FieldJson::parse(options_text), "the options", request.options);
   request.gray = gray;
   request.replace = replace;
   request.format = &query::export_format(format);

@@ -3,6 +3,7 @@
 #include <nanobind/nanobind.h>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/global/open_global.h"
 #include "python/native/bindings.h"
 #include "python/native/path_text.h"
@@ -23,6 +24,7 @@ void raise(const Error& error) {
 }  // namespace voxdag::python
 
 NB_MODULE(_native, module) {
+  voxdag::set_option_speller(&voxdag::spell_as_keyword);
   nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
     try {
       std::rethrow_exception(thrown);

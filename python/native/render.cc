@@ -38,15 +38,25 @@ query::Vec in_voxels(const Point& point, const char* what, const voxdag_reader::
   return voxels;
 }
 
-// Throws Error{kOutOfMemory} if the renderer's memory and the array of pixels together exceed the
-// limit `memory`. voxdag.render() calls this function before it allocates the array, because the
-// system can end a process that allocates too much memory.
-void check_memory(int width, int height, const std::string& background, const std::string& memory) {
+// Returns the memory that the shade needs for this file.
+uint64_t shade_memory(const PathText& path, const std::string& shade) {
+  const query::Shade kind = query::shade_named(shade);
+  if (kind != query::Shade::kSharing) return 0;
+  const auto file = open_global_file(path.bytes);
+  return query::shade_bytes(query::DagView(*file), kind);
+}
+
+// Throws Error{kOutOfMemory} if the memory of the renderer, the shade and the array of pixels
+// together exceed the limit `memory`. voxdag.render() calls this function before it allocates the
+// array, because the system can end a process that allocates too much memory.
+void check_memory(const PathText& path, int width, int height, const std::string& background,
+                  const std::string& shade, const std::string& memory) {
   const uint64_t limit = memory_of(memory);
   const query::Background kind = query::background_named(background);
   const uint64_t of_pixel =
       query::render_bytes_per_pixel(kind) + static_cast<uint64_t>(query::channels_of(kind));
-  const uint64_t bytes = of_pixel * static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
+  const uint64_t bytes = of_pixel * static_cast<uint64_t>(width) * static_cast<uint64_t>(height) +
+                         shade_memory(path, shade);
   if (bytes > limit)
     throw Error(ErrorCode::kOutOfMemory,
                 "a picture of " + std::to_string(width) + " x " + std::to_string(height) +
@@ -90,8 +100,8 @@ void render(const PathText& path, const std::string& view, const std::optional<P
 }  // namespace
 
 void bind_render(nb::module_& module) {
-  module.def("check_render_memory", &check_memory, nb::arg("width"), nb::arg("height"),
-             nb::arg("background"), nb::arg("memory"));
+  module.def("check_render_memory", &check_memory, nb::arg("path"), nb::arg("width"),
+             nb::arg("height"), nb::arg("background"), nb::arg("shade"), nb::arg("memory"));
   module.def("render", &render, nb::arg("path"), nb::arg("view"), nb::arg("camera").none(),
              nb::arg("target"), nb::arg("fov").none(), nb::arg("samples"), nb::arg("background"),
              nb::arg("shade"), nb::arg("gray"), nb::arg("threads"), nb::arg("progress").none(),

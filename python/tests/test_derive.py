@@ -55,6 +55,9 @@ def test_export_in_gray(mesh, tmp_path):
     [
         (lambda path, out: voxdag.extract(path, path, force=True), "invalid_input"),
         (lambda path, out: voxdag.extract(path, out, region=(70, 0, 0, 80, 9, 9)), "invalid_input"),
+        (lambda path, out: voxdag.export(path, out, to="npz", up="x"), "invalid_input"),
+        (lambda path, out: voxdag.export(path, out, to="npz", band=0), "invalid_input"),
+        (lambda path, out: voxdag.export(path, out, to="npz", watertight=True), "invalid_input"),
         (lambda path, out: voxdag.extract(path, out, level=9), "invalid_input"),
         (lambda path, out: voxdag.extract(path, out, level=1), "invalid_input"),
         (lambda path, out: voxdag.extract(path, out, memory="8MiB"), "invalid_input"),

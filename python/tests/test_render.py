@@ -123,6 +123,11 @@ def test_what_takes_too_much_memory_says_so(path):
         "choose a smaller size, or more with memory=",
     ):
         voxdag.render(path, size=(16384, 16384), memory="1GiB")
+    # shade="sharing" needs as much memory as the nodes of the file, in addition to the pixels.
+    largest = {"size": (1271, 800), "memory": "64MiB", "samples": 1}  # 64 bytes below 64 MiB
+    assert voxdag.render(path, **largest).shape == (800, 1271, 3)
+    with pytest.raises(voxdag.Error, match="choose a smaller size"):
+        voxdag.render(path, shade="sharing", **largest)
     assert voxdag.render(
         path, size=(np.int64(32), np.int32(16)), memory="64MiB", samples=1
     ).shape == (16, 32, 3)

@@ -122,18 +122,15 @@ def export(
     """
     path, output = path_text(path), path_text(output)
     to = _format_of(output) if to is None else to
-    if up not in (None, "y", "z"):
-        raise Error(f"up={up!r}: expected 'y' or 'z'", "invalid_input")
-    options = json.dumps(
-        {
-            "up": up or "",
-            "grid": grid or "",
-            "band": band or 0,
-            "compact": bool(compact),
-            "outside": bool(outside),
-            "watertight": bool(watertight),
-        }
-    )
+    options = {
+        "up": up,
+        "grid": grid,
+        "band": band,
+        "compact": bool(compact),
+        "outside": bool(outside),
+        "watertight": bool(watertight),
+    }
+    given = json.dumps({name: value for name, value in options.items() if value is not None})
     files = _native.export_paths(to, output)
     _check_output(path, files, force)
     with Dag(path) as dag:
@@ -141,7 +138,7 @@ def export(
         levels = dag._levels(level)
     with shown(progress) as callback:
         report = _native.export(
-            path, output, to, levels, low, high, memory_text(memory), gray, force, options, callback
+            path, output, to, levels, low, high, memory_text(memory), gray, force, given, callback
         )
     return cast(ExportReport, {"files": files, **json.loads(report)})
 

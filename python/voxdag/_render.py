@@ -88,7 +88,7 @@ def render(
     place = None if camera is None else _point(camera, "camera")
     aim = (0.0, 0.0, 0.0) if target is None else _point(target, "target")
     file = path_text(path)
-    _native.check_render_memory(width, height, background, memory_text(memory))
+    _native.check_render_memory(file, width, height, background, shade, memory_text(memory))
     pixels = np.empty((height, width, 4 if background == "transparent" else 3), np.uint8)
     with shown(progress) as callback:
         _native.render(

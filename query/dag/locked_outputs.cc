@@ -3,6 +3,7 @@
 #include <array>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/io/overwrite.h"
 
 namespace voxdag::query {
@@ -30,8 +31,8 @@ void refuse_replacing(FileSystem& files, const Outputs& outputs) {
     for (const std::string& name : {path, partial_path(path)}) {
       const auto file = open_if_there(files, name);
       if (file && file->size() > 0)
-        throw Error(ErrorCode::kInvalidInput,
-                    name + " exists: expected another output, or --force to replace it");
+        throw Error(ErrorCode::kInvalidInput, name + " exists: expected another output, or " +
+                                                  option_text("force") + " to replace it");
     }
 }
 

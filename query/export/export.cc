@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "query/dag/locked_outputs.h"
@@ -53,20 +54,21 @@ std::span<const ExportFormat> export_formats() { return kFormats; }
 const ExportFormat& export_format(const std::string& name) {
 #ifdef VOXDAG_VDB_ADVICE
   if (name == "vdb" || name == "nvdb")
-    throw Error(ErrorCode::kInvalidInput,
-                "--to " + name + ": this voxdag was built without OpenVDB: " VOXDAG_VDB_ADVICE);
+    throw Error(
+        ErrorCode::kInvalidInput,
+        option_text("to", name) + ": this voxdag was built without OpenVDB: " VOXDAG_VDB_ADVICE);
 #endif
   std::string names;
   for (const ExportFormat& format : kFormats) {
     if (name == format.name) return format;
     names += std::string(names.empty() ? "" : ", ") + format.name;
   }
-  throw Error(ErrorCode::kInvalidInput, "--to " + name + ": expected one of " + names);
+  throw Error(ErrorCode::kInvalidInput, option_text("to", name) + ": expected one of " + names);
 }
 
 void check_export_options(const ExportFormat& format, const ExportOptions& options) {
-  const std::pair<const char*, bool> given[] = {{"grid", !options.grid.empty()},
-                                                {"band", options.band != 0},
+  const std::pair<const char*, bool> given[] = {{"grid", options.grid != GridKind::kOfFormat},
+                                                {"band", options.band.has_value()},
                                                 {"compact", options.compact},
                                                 {"outside", options.outside},
                                                 {"watertight", options.watertight}};
@@ -78,9 +80,14 @@ void check_export_options(const ExportFormat& format, const ExportOptions& optio
     std::string formats;
     for (const ExportFormat& other : kFormats)
       if (has(other)) formats += std::string(formats.empty() ? "" : " or ") + other.name;
-    throw Error(ErrorCode::kInvalidInput,
-                "--" + std::string(name) + ": expected --to " + formats + ", not " + format.name);
+    throw FieldError(name, (formats.empty() ? "a format that this voxdag was built without"
+                                            : "the format " + formats) +
+                               ", not " + format.name);
   }
+  if (options.band && options.grid != GridKind::kSdf)
+    throw FieldError("band", "also " + option_text("grid", "sdf"));
+  if (options.band && (*options.band < 1 || *options.band > kMaxExportBand))
+    throw FieldError("band", "a whole number from 1 to " + std::to_string(kMaxExportBand));
 }
 
 std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output) {

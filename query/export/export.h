@@ -3,13 +3,16 @@
 // before anything is written.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/progress.h"
+#include "core/fields/field.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 #include "query/dag/selection.h"
@@ -34,16 +37,49 @@ struct ExportReport {
 // The axis of the exported file along which the y axis of the .vdag file points. kOfFormat is the
 // default of the format.
 enum class UpAxis { kOfFormat, kY, kZ };
+constexpr std::array<const char*, 3> enum_names(UpAxis) { return {"", "y", "z"}; }
+
+// The kind of a grid of voxels in a vdb or nvdb file. kOfFormat means kDensity.
+enum class GridKind { kOfFormat, kDensity, kMask, kSdf };
+constexpr std::array<const char*, 4> enum_names(GridKind) { return {"", "density", "mask", "sdf"}; }
+
+inline constexpr int kMaxExportBand = 16;
 
 // All formats have the option `up`; only some formats have the other options.
 struct ExportOptions {
   UpAxis up = UpAxis::kOfFormat;
-  std::string grid;         // vdb, nvdb: density, mask or sdf; "" means density
-  int band = 0;             // with the grid sdf: half width of the band, in voxels; 0 means 3
+  GridKind grid = GridKind::kOfFormat;  // vdb, nvdb
+  std::optional<int> band;  // with GridKind::kSdf: half width of the band, in voxels; default 3
   bool compact = false;     // npz: leave out arrays that can be computed from the others
   bool outside = false;     // glb: only faces that are visible from outside
   bool watertight = false;  // glb: no vertex is inside a side of a rectangle (surface_mesh.h)
 };
+
+// The description from which the options of the command line, the service and Python derive.
+template <class Visitor>
+void fields(Visitor& visit, ExportOptions& options) {
+  visit(Field("up", "axis of the exported file that gets the y axis of the scene")
+            .unset_means("z for vox, otherwise y"),
+        options.up);
+  visit(Field("grid",
+              "vdb, nvdb: density, a fog volume; mask, which is smaller; or sdf, the distance to "
+              "the surface of a solid")
+            .unset_means("density"),
+        options.grid);
+  visit(Field("band", "vdb, nvdb with the grid sdf: distances up to this number of voxels")
+            .range(1, kMaxExportBand)
+            .unset_means("3"),
+        options.band);
+  visit(Field("compact", "npz: leave out the arrays that can be computed from the others"),
+        options.compact);
+  visit(Field("outside",
+              "glb: write only the faces that are visible from outside, not those around enclosed "
+              "space"),
+        options.outside);
+  visit(
+      Field("watertight", "glb: write a closed mesh: triangles meet at common edges and vertices"),
+      options.watertight);
+}
 
 struct ExportFormat {
   const char* name;
@@ -67,7 +103,8 @@ const ExportFormat& export_format(const std::string& name);
 // have the suffix that the format needs.
 std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output);
 
-// Throws Error{kInvalidInput} if `options` has a value for an option that the format does not have.
+// Throws FieldError if `options` has a value for an option that the format does not have, or an
+// invalid band.
 void check_export_options(const ExportFormat& format, const ExportOptions& options);
 
 struct ExportRequest {

@@ -4,6 +4,7 @@
 #include <charconv>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
 #include "query/lookup/bricks.h"
@@ -21,26 +22,29 @@ Selection coarser(const Selection& selection, uint32_t grid_levels) {
   return coarse;
 }
 
+std::string less_is_needed() {
+  return "a smaller " + option_text("region") + " or a coarser " + option_text("level") +
+         " needs less";
+}
+
 void require_space(const ExportJob& job, uint64_t bytes) {
   const uint64_t free = job.files.free_space(parent_directory(job.output));
   if (bytes > free)
-    throw Error(ErrorCode::kNoSpace,
-                job.output + " will have " + size_text(bytes) + ", but the disk has only " +
-                    size_text(free) + " free: a smaller --region or a coarser --level needs less");
+    throw Error(ErrorCode::kNoSpace, job.output + " will have " + size_text(bytes) +
+                                         ", but the disk has only " + size_text(free) +
+                                         " free: " + less_is_needed());
 }
 
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels) {
-  std::string text = "--level " + std::to_string(grid_levels);
+  std::string text = option_text("level", std::to_string(grid_levels));
   if (job.selects_all_of(job.selection.grid_levels)) return text;
   const Region region =
       job.turn.original(coarser(job.selection, grid_levels).region, int64_t{1} << grid_levels);
-  std::string separator = " --region ";
+  std::string box;
   for (const auto& corner : {region.low, region.high})
-    for (const int64_t coordinate : corner) {
-      text += separator + std::to_string(coordinate);
-      separator = ",";
-    }
-  return text;
+    for (const int64_t coordinate : corner)
+      box += (box.empty() ? "" : ",") + std::to_string(coordinate);
+  return text + " " + option_text("region", box);
 }
 
 void refuse_size(const ExportJob& job, const std::string& problem,
@@ -57,11 +61,11 @@ void refuse_size(const ExportJob& job, const std::string& problem,
   }
   job.cancel.check();
   const std::string grid = std::to_string(int64_t{1} << (end - 1));
-  throw Error(code,
-              job.output + ": " + problem +
-                  (end > kBrickLevels ? ". " + coarser_options(job, end - 1) + " (" + grid +
-                                            " voxels per edge) fits, or take a smaller --region"
-                                      : ". Expected a smaller --region"));
+  throw Error(code, job.output + ": " + problem +
+                        (end > kBrickLevels ? ". " + coarser_options(job, end - 1) + " (" + grid +
+                                                  " voxels per edge) fits, or take a smaller "
+                                            : ". Expected a smaller ") +
+                        option_text("region"));
 }
 
 uint64_t count_voxels(const ExportJob& job, const Selection& selection, uint64_t limit) {
@@ -111,8 +115,8 @@ bool CellLimit::fits(uint32_t grid_levels) {
 }
 
 void refuse_empty(const ExportJob& job) {
-  throw Error(ErrorCode::kInvalidInput,
-              job.file.path() + ": no voxels are selected: expected a --region with voxels");
+  throw Error(ErrorCode::kInvalidInput, job.file.path() + ": no voxels are selected: expected a " +
+                                            option_text("region") + " with voxels");
 }
 
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected) {

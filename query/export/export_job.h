@@ -104,9 +104,9 @@ class CancelCheck {
 
 // Returns the same part of the file on a coarser grid.
 Selection coarser(const Selection& selection, uint32_t grid_levels);
-// Returns command line options that select the same part of the scene on a coarser grid, for
-// messages: "--level 11", followed by "--region" if the job does not select the complete grid. The
-// region is in cells of the coarser grid and in the axes of the file.
+// Returns options that select the same part of the scene on a coarser grid, for messages:
+// "--level 11" on the command line, followed by "--region" if the job does not select the complete
+// grid. The region is in cells of the coarser grid and in the axes of the file.
 std::string coarser_options(const ExportJob& job, uint32_t grid_levels);
 
 // Publishes the files and returns their total size in bytes. If a read of the input file has failed
@@ -115,6 +115,9 @@ inline uint64_t publish(const ExportJob& job, std::span<ExportFile* const> writt
   job.watched.check_readable();
   return ExportFile::publish(written);
 }
+
+// Returns advice for messages: "a smaller --region or a coarser --level needs less".
+std::string less_is_needed();
 
 // Throws Error{kNoSpace} if the disk of the output has less than `bytes` free.
 void require_space(const ExportJob& job, uint64_t bytes);

@@ -11,6 +11,7 @@
 #include <bit>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "query/export/export_file.h"
 #include "query/export/selected_dag.h"
@@ -147,8 +148,8 @@ class HashDagWriter {
                     job_.output + ": a node of level " + std::to_string(level) + " encloses " +
                         count_text(count) + " voxels, but HashDAG takes fewer than " +
                         count_text(kMaxCount) + ". " + coarser_options(job_, 17) +
-                        " (131072 voxels per edge) fits, or take a smaller "
-                        "--region");
+                        " (131072 voxels per edge) fits, or take a smaller " +
+                        option_text("region"));
       }
       file_.write(std::as_bytes(std::span(words).first(nodes.size() + 1)));
       stage.advance(1);
@@ -195,7 +196,8 @@ void require_hashdag_limits(const ExportJob& job, const SelectedDag& dag) {
            count_text(nodes) + " nodes, but HashDAG takes fewer than " + count_text(kMaxCount));
   if (job.has_colors && dag.voxels() > kMaxHashDagColors)
     refuse(count_text(dag.voxels()) + " voxels are selected, but HashDAG numbers at most " +
-           count_text(kMaxHashDagColors) + " for colors (--gray leaves them out)");
+           count_text(kMaxHashDagColors) + " for colors (" + option_text("gray") +
+           " leaves them out)");
 }
 
 }  // namespace

@@ -4,14 +4,14 @@
 #include <bit>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "query/lookup/bricks.h"
 
 namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNoOffset = ~uint64_t{0};
-constexpr const char* kDagMemory =
-    "the DAG of the selection (a smaller --region or a coarser --level needs less)";
+std::string dag_memory() { return "the DAG of the selection (" + less_is_needed() + ")"; }
 
 uint64_t mix_bits(uint64_t x) {
   x = (x ^ x >> 32) * 0x9e3779b97f4a7c15u;
@@ -44,7 +44,7 @@ class SlotTable {
   }
   void grow() {
     const size_t count = std::max<size_t>(64, 2 * slots_.size());
-    MemoryCharge charge(budget_, count * sizeof(Slot), kDagMemory);
+    MemoryCharge charge(budget_, count * sizeof(Slot), dag_memory());
     std::vector<Slot> old(count);
     old.swap(slots_);
     for (const Slot& slot : old)
@@ -102,9 +102,9 @@ class BuiltLevel {
     const size_t count = std::max<size_t>(256, words_.capacity() + words_.capacity() / 2);
     if (count > uint64_t{1} << 32)
       throw Error(ErrorCode::kLimit,
-                  "the DAG of the selection has a level of over 2^32 words: expected "
-                  "a smaller --region or a coarser --level");
-    MemoryCharge charge(budget_, count * sizeof(uint32_t), kDagMemory);
+                  "the DAG of the selection has a level of over 2^32 words: expected a smaller " +
+                      option_text("region") + " or a coarser " + option_text("level"));
+    MemoryCharge charge(budget_, count * sizeof(uint32_t), dag_memory());
     words_.reserve(count);
     charge_ = std::move(charge);
   }

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "core/format/bytes.h"
 #include "query/export/color/color_palette.h"
@@ -351,11 +352,12 @@ ExportReport write_vox(const ExportJob& job) {
     // Suggests coarser grids that fit even if no models are shared. A voxel takes 4 bytes. Three
     // fourths of kMaxVoxBytes are for voxels, and the last fourth is for models and instances.
     CellLimit cells(job, kMaxVoxBytes / 16 * 3);
-    refuse_size(job,
-                size_text(bytes) + " or more are needed" +
-                    (job.has_colors ? " with colors (--gray leaves them out)" : "") +
-                    ", but the chunks of a .vox file have at most " + size_text(kMaxVoxBytes),
-                [&](uint32_t level) { return cells.fits(level); });
+    refuse_size(
+        job,
+        size_text(bytes) + " or more are needed" +
+            (job.has_colors ? " with colors (" + option_text("gray") + " leaves them out)" : "") +
+            ", but the chunks of a .vox file have at most " + size_text(kMaxVoxBytes),
+        [&](uint32_t level) { return cells.fits(level); });
   }
   require_space(job, bytes);
   ExportReport report;
@@ -374,7 +376,8 @@ ExportReport write_vox(const ExportJob& job) {
   if (job.has_colors) {
     report.add_fact("palette_colors", colors.count());
     report.notes.push_back("a palette of " + count_text(colors.count()) +
-                           " colors; each place has a separate model (--gray shares equal models)");
+                           " colors; each place has a separate model (" + option_text("gray") +
+                           " shares equal models)");
   }
   if (dag.grid_levels() > std::bit_width(kMagicaVoxelEdge) - 1)
     report.notes.emplace_back(

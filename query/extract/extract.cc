@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/dag/consing/consing_memory.h"
 #include "core/format/artifact/artifact_writer.h"
@@ -223,7 +224,8 @@ std::vector<SelectedPart> Extraction::build_part(Worker& worker, const SelectedP
     if (cube.level == shape_.brick_level())
       throw Error(ErrorCode::kOutOfMemory, "a brick does not fit a worker's share of " +
                                                std::to_string(worker.share.limit()) +
-                                               " bytes: expected more memory (--memory)");
+                                               " bytes: expected more memory (" +
+                                               option_text("memory") + ")");
     return worker.builder.split(part);
   }
 }

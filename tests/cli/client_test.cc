@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <thread>
+#include <utility>
 
 #include "client/http_client.h"
 #include "tests/cli/command_line.h"
@@ -124,6 +126,16 @@ TEST_F(Client, LabelsAndFindsJobs) {
   const Answer listed = run({"jobs", "--label", night});
   EXPECT_NE(listed.out.find("one  #" + night + "  #b"), std::string::npos) << listed.out;
 
+  // Ids can be shortened as long as they are unique. Of 17 ids, two begin with the same digit.
+  const std::string id = first["id"];
+  EXPECT_EQ(run_json({"watch", id.substr(0, 15)})["id"], id);
+  std::string same;
+  for (std::map<char, std::string> ids; same.empty();) {
+    const std::string next = run_json({"submit", "m.glb", "-r", "16"}).at("id");
+    if (const std::string other = std::exchange(ids[next[0]], next); !other.empty()) same = next;
+  }
+  expect_error(2, "begin with it: expected more digits", {"watch", same.substr(0, 1)});
+
   const double uploaded = metric("voxdag_uploaded_bytes_total");
   ASSERT_EQ(run({"generate", "soup", "other.glb", "--triangles", "10"}).status, 0);
   for (const std::string& label : {std::string(65, 'x'), std::string("a\nb"), std::string()})
@@ -205,6 +217,19 @@ TEST_F(Client, DownloadsExports) {
   ASSERT_EQ(run({"download", id, "--to", "vdag", "--level", "4", "-o", "coarse.vdag"}).status, 0);
   ASSERT_EQ(run({"extract", "m.vdag", "--level", "4", "-o", "local.vdag"}).status, 0);
   EXPECT_TRUE(contents("coarse.vdag") == contents("local.vdag"));
+
+  // Exports are listed, and deleted by their ids.
+  const Json exports = run_json({"exports", id})["exports"];
+  ASSERT_EQ(exports.size(), 3u);
+  const std::string first = exports[0]["id"], second = exports[1]["id"];
+  const Answer list = run({"exports", id});
+  EXPECT_NE(list.out.find(first), std::string::npos) << list.out;
+  EXPECT_NE(list.out.find(exports[0]["files"][0]["name"]), std::string::npos) << list.out;
+  EXPECT_EQ(run_json({"exports", id, "--delete", first, "--delete", second}),
+            (Json{{first, "deleted"}, {second, "deleted"}}));
+  EXPECT_EQ(run_json({"exports", id})["exports"].size(), 1u);
+  expect_error(3, first, {"exports", id, "--delete", first});
+  expect_error(2, "16 hex digits", {"exports", id, "--delete", "nope"});
 
   expect_error(2, "--to FORMAT", {"download", id, "--level", "5", "-o", "x.vdag"});
   expect_error(2, "expected one of vdag", {"download", id, "--to", "fbx", "-o", "x.fbx"});

@@ -10,9 +10,9 @@ namespace {
 using Help = CommandLine;
 
 constexpr const char* kCommands[] = {
-    "build",  "plan",     "status", "info",    "verify", "diff",    "generate",
-    "render", "extract",  "submit", "jobs",    "watch",  "cancel",  "suspend",
-    "resume", "download", "view",   "combine", "edit",   "publish", "reorder",
+    "build",   "plan",    "status", "info",    "verify",  "diff",    "generate", "render",
+    "extract", "submit",  "jobs",   "watch",   "cancel",  "suspend", "resume",   "download",
+    "view",    "combine", "edit",   "publish", "reorder", "exports",
 #ifdef VOXDAG_HAS_ASSIMP
     "import",
 #endif

@@ -355,7 +355,9 @@ def vox(path, grid):
 
 
 def vdb(path, grid):
-    name = pyopenvdb.readAllGridMetadata(path)[0].name
+    names = [grid.name for grid in pyopenvdb.readAllGridMetadata(path)]
+    assert names == sorted(names), f"{names}: vdb_render reads only files with sorted names"
+    name = next(name for name in names if name != "Cd")
     read = pyopenvdb.read(path, name)
     is_density = isinstance(read, pyopenvdb.FloatGrid)
     assert name == ("density" if is_density else "voxels")

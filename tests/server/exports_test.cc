@@ -168,6 +168,22 @@ TEST_F(ServiceExports, RefuseWrongRequests) {
   EXPECT_EQ(not_problem(more, 422, "limit"), "");
 }
 
+// Messages name members of the request, not options of the command line.
+TEST_F(ServiceExports, NameMembersInMessages) {
+  start();
+  const std::string id = finished_job();
+  const ClientResponse refused = post(exports_of(id), {{"to", "npz"}, {"watertight", true}});
+  EXPECT_EQ(Json::parse(refused.body)["detail"], "'watertight': expected the format glb, not npz");
+  // The center of the sponge has no voxels.
+  const Json failed =
+      ended(queued_export(id, {{"to", "npz"}, {"region", {30, 30, 30, 34, 34, 34}}}));
+  EXPECT_EQ(failed["error"]["code"], "invalid_input") << failed.dump(2);
+  const std::string message = failed["error"]["message"];
+  EXPECT_NE(message.find("no voxels are selected: expected a 'region' with voxels"),
+            std::string::npos)
+      << message;
+}
+
 // A failed export has the code of its error, no files, and no path of the server. Here it fails
 // because an extract by majority cannot keep colors. The same request queues the export again.
 TEST_F(ServiceExports, ReportWhyTheyFailed) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/checksum.h"
 #include "query/export/dag_export.h"
 #include "query/export/export_job.h"
@@ -66,11 +67,11 @@ class ChunkFinder {
 
 void check_chunks(const ChunksRequest& request) {
   if (!std::has_single_bit(request.edge) || request.edge < kMinChunkEdge)
-    throw Error(ErrorCode::kInvalidInput, "--chunks " + std::to_string(request.edge) +
+    throw Error(ErrorCode::kInvalidInput, option_text("chunks", std::to_string(request.edge)) +
                                               ": expected a power of two of at least 4");
   const uint32_t selected = request.request.selection.grid_levels;
   if (request.levels < 1 || request.levels + kBrickLevels > selected + 1)
-    throw Error(ErrorCode::kInvalidInput, "--levels " + std::to_string(request.levels) +
+    throw Error(ErrorCode::kInvalidInput, option_text("levels", std::to_string(request.levels)) +
                                               ": expected 1 to " +
                                               std::to_string(selected + 1 - kBrickLevels) +
                                               ", because the coarsest grid has 4 voxels per edge");
@@ -81,7 +82,8 @@ void check_folder(FileSystem& files, const ExportRequest& request) {
     return;
   throw Error(ErrorCode::kInvalidInput, request.output +
                                             ": the folder is not empty: expected a new or empty "
-                                            "folder, or --force to replace files in it");
+                                            "folder, or " +
+                                            option_text("force") + " to replace files in it");
 }
 
 class ChunkWriter {

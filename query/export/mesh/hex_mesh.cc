@@ -7,8 +7,7 @@
 namespace voxdag::query {
 namespace {
 
-constexpr const char* kMeshMemory =
-    "two layers of the mesh (a smaller --region or a coarser --level needs less)";
+std::string mesh_memory() { return "two layers of the mesh (" + less_is_needed() + ")"; }
 
 // For one axis: `low` has the bits of a brick's mask at which bit 0 of the coordinate on the axis
 // is set, and `high` has the bits at which bit 1 is set. Two cells that differ only in bit 0 of
@@ -65,7 +64,7 @@ HexSweep::Slab<HexSweep::HexBrick> HexSweep::read_slab(int64_t slab) const {
                              ? slabs_.brick_counts[static_cast<size_t>(slab)]
                              : 0;
   if (count == 0) return bricks;
-  bricks.items = PageBuffer<HexBrick>(job_.budget, count, kMeshMemory);
+  bricks.items = PageBuffer<HexBrick>(job_.budget, count, mesh_memory());
   Selection layer = job_.selection;
   const int64_t low = (slabs_.first + slab) * kBrickEdge;
   layer.region.low[0] = std::max(layer.region.low[0], low);
@@ -114,7 +113,7 @@ void HexSweep::number_points() {
   merge_points([&](uint64_t, uint64_t) { ++count; });
   points_ = {};
   if (count == 0) return;
-  points_.items = PageBuffer<PointBrick>(job_.budget, count, kMeshMemory);
+  points_.items = PageBuffer<PointBrick>(job_.budget, count, mesh_memory());
   merge_points([&](uint64_t place, uint64_t mask) {
     points_.items[points_.count++] = {place, mask, next_point_};
     next_point_ += static_cast<uint64_t>(std::popcount(mask));

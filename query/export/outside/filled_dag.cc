@@ -3,12 +3,15 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/dag/space/enclosed_fill.h"
 
 namespace voxdag::query {
 namespace {
 
-constexpr const char* kFilledMemory = "the search for enclosed space (--outside)";
+std::string filled_memory() {
+  return "the search for enclosed space (" + option_text("outside") + ")";
+}
 
 // Reads the levels of a DAG, from the bricks upwards.
 class LevelReader {
@@ -107,7 +110,7 @@ class WordLevels : public SubDagSink {
 
   void bricks(const BrickLevelView& level) override {
     PageBuffer<uint32_t>& words = add_level(2 * level.masks.size());
-    offsets_ = PageBuffer<uint32_t>(budget_, level.masks.size(), kFilledMemory);
+    offsets_ = PageBuffer<uint32_t>(budget_, level.masks.size(), filled_memory());
     for (size_t i = 0; i < level.masks.size(); ++i) {
       words[2 * i] = static_cast<uint32_t>(level.masks[i]);
       words[2 * i + 1] = static_cast<uint32_t>(level.masks[i] >> 32);
@@ -116,7 +119,7 @@ class WordLevels : public SubDagSink {
   }
   void nodes(const NodeLevelView& level) override {
     PageBuffer<uint32_t>& words = add_level(level.masks.size() + level.children.size());
-    PageBuffer<uint32_t> offsets(budget_, level.masks.size(), kFilledMemory);
+    PageBuffer<uint32_t> offsets(budget_, level.masks.size(), filled_memory());
     size_t used = 0, child = 0;
     for (size_t i = 0; i < level.masks.size(); ++i) {
       offsets[i] = static_cast<uint32_t>(used);
@@ -135,7 +138,7 @@ class WordLevels : public SubDagSink {
  private:
   PageBuffer<uint32_t>& add_level(uint64_t words) {
     if (words > UINT32_MAX) throw OutOfBudget();
-    return levels_.emplace_back(budget_, words, kFilledMemory);
+    return levels_.emplace_back(budget_, words, filled_memory());
   }
 
   MemoryBudget& budget_;
@@ -168,9 +171,9 @@ FilledDag::FilledDag(const DagView& dag, uint32_t grid_levels, const std::string
     levels_ = filled_levels(dag, grid_levels, budget, cancel);
   } catch (const OutOfBudget&) {
     throw Error(ErrorCode::kOutOfMemory,
-                std::string("out of memory: ") + kFilledMemory +
-                    " does not fit in the memory budget: expected a larger budget (--memory) or a "
-                    "coarser --level");
+                "out of memory: " + filled_memory() +
+                    " does not fit in the memory budget: expected a larger budget (" +
+                    option_text("memory") + ") or a coarser " + option_text("level"));
   }
   std::vector<DagView::Level> views;
   for (const PageBuffer<uint32_t>& level : levels_)

@@ -8,6 +8,7 @@
 #include <array>
 #include <optional>
 
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
@@ -199,7 +200,7 @@ void put_glb(const ExportJob& job, const SurfaceMesh& mesh, const GlbLayout& lay
   CellLimit cells(job, (max_bytes - kMaxGlbJsonBytes) / cell_bytes);
   refuse_size(job,
               std::string("the mesh ") +
-                  (job.has_colors ? "with colors (--gray merges more) " : "") +
+                  (job.has_colors ? "with colors (" + option_text("gray") + " merges more) " : "") +
                   "is too large: a .glb file has at most " + size_text(max_bytes),
               [&](uint32_t level) { return cells.fits(level); });
 }

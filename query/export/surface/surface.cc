@@ -35,7 +35,7 @@ Surface::Surface(const ExportJob& job, uint64_t max_rectangles)
       max_rectangles_(max_rectangles),
       clips_faces_(job.filled && !job.selects_all_of(job.selection.grid_levels)),
       colors_(job.file),
-      rectangles_(job.budget, kSurfaceMemory) {
+      rectangles_(job.budget, surface_memory()) {
   BrickRows bricks = read_bricks();
   ExportStage stage(job, "find faces", 6 * listed_bricks_, "bricks");
   for (uint8_t axis = 0; axis < 3; ++axis) {
@@ -81,7 +81,7 @@ BrickRows Surface::read_bricks() {
   voxels_ = job_.filled ? count_voxels(job_, job_.selection, ~uint64_t{0}) : cells;
   if (voxels_ == 0) refuse_empty(job_);
   listed_bricks_ = bricks + 2 * sides;
-  BrickRows rows(job_.budget, bricks, sides, kSurfaceMemory);
+  BrickRows rows(job_.budget, bricks, sides, surface_memory());
   ExportStage stage(job_, "read", bricks + cubes, "bricks");
   for_each_brick_or_full_cube(
       dag, selection,

@@ -18,8 +18,11 @@
 
 namespace voxdag::query {
 
-inline constexpr const char* kSurfaceMemory =
-    "the surface (a smaller --region or a coarser --level needs less)";
+// Returns the name of the surface's memory in error messages. The reference remains valid.
+inline const std::string& surface_memory() {
+  static const std::string kName = "the surface (" + less_is_needed() + ")";
+  return kName;
+}
 
 // A rectangle of faces perpendicular to `axis`. `plane` is the coordinate of the faces on this
 // axis. The rectangle extends from u0 to u1 on the next axis, and from v0 to v1 on the axis after

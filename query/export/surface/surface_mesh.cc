@@ -39,10 +39,10 @@ std::array<uint64_t, 4> corners_of(const SurfaceRectangle& r) {
 
 VertexTable::VertexTable(MemoryBudget& budget, uint64_t expected)
     : budget_(budget),
-      slots_(budget, slots_for_vertices(expected), kSurfaceMemory),
+      slots_(budget, slots_for_vertices(expected), surface_memory()),
       shift_(64 - std::countr_zero(slots_.size())),
-      places_(budget, kSurfaceMemory),
-      colors_(budget, kSurfaceMemory) {}
+      places_(budget, surface_memory()),
+      colors_(budget, surface_memory()) {}
 
 // Returns the slot of a vertex, or the free slot where it belongs.
 size_t VertexTable::probe(uint64_t place, uint32_t color) const {
@@ -54,7 +54,7 @@ size_t VertexTable::probe(uint64_t place, uint32_t color) const {
 
 void VertexTable::grow() {
   PageBuffer<Slot> old =
-      std::exchange(slots_, PageBuffer<Slot>(budget_, 2 * slots_.size(), kSurfaceMemory));
+      std::exchange(slots_, PageBuffer<Slot>(budget_, 2 * slots_.size(), surface_memory()));
   --shift_;
   for (const Slot& slot : old)
     if (slot.vertex_plus_1 != 0) slots_[probe(slot.place, slot.color)] = slot;
@@ -79,7 +79,7 @@ bool VertexTable::contains(uint64_t place, Rgb color) const {
 }
 
 SurfaceMesh::SurfaceMesh(const ExportJob& job, const Surface& surface)
-    : vertices_(job.budget, expected_vertices(surface)), indices_(job.budget, kSurfaceMemory) {
+    : vertices_(job.budget, expected_vertices(surface)), indices_(job.budget, surface_memory()) {
   const bool closed = job.options.watertight;
   ExportStage stage(job, "find vertices", (closed ? 2 : 1) * surface.rectangles().size(),
                     "rectangles");

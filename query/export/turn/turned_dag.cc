@@ -3,6 +3,8 @@
 #include <array>
 #include <string>
 
+#include "core/base/options/option_text.h"
+
 namespace voxdag::query {
 namespace {
 
@@ -85,7 +87,8 @@ std::vector<PageBuffer<uint32_t>> turned_levels(const DagView& dag, const AxisTu
   const NodeTurner turner(dag, turn, cancel);
   std::vector<PageBuffer<uint32_t>> levels;
   for (uint32_t level = 0; level <= brick_level; ++level) {
-    levels.emplace_back(budget, dag.level(level).words.size(), "the DAG with turned axes (--up)");
+    levels.emplace_back(budget, dag.level(level).words.size(),
+                        "the DAG with turned axes (" + option_text("up") + ")");
     if (level < brick_level)
       turner.turn_nodes(level, levels.back().data());
     else

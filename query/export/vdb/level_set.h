@@ -11,13 +11,14 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "query/export/level_set/narrow_band.h"
 #include "query/export/vdb/vdb_grid.h"
 
 namespace voxdag::query {
 
 // Returns the half width of a level set's band, in voxels.
-inline int band_of(const ExportJob& job) { return job.options.band == 0 ? 3 : job.options.band; }
+inline int band_of(const ExportJob& job) { return job.options.band.value_or(3); }
 
 // Like vdb_size(), for the tree of a level set. Does not count voxels.
 template <class Steps>
@@ -54,9 +55,10 @@ VdbSize level_set_size(const ExportJob& job, const Selection& selection, const V
 inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t leaves) {
   if (!has_inside(job.dag, job.cancel))
     throw Error(ErrorCode::kInvalidInput,
-                job.file.path() +
-                    ": the voxels are a surface without an inside, so --grid sdf has no signs: "
-                    "expected a file of voxdag build --solid RULE, or --grid density");
+                job.file.path() + ": the voxels are a surface without an inside, so " +
+                    option_text("grid", "sdf") +
+                    " has no signs: expected a file of voxdag build --solid RULE, or " +
+                    option_text("grid", "density"));
   const int width = band_of(job), limit = 4 * width * width;
   const Region domain = band_domain(job.selection, width);
   const auto background = static_cast<float>(width * job.cell_edge());

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "query/export/color/linear_colors.h"
 #include "query/export/export_file.h"
@@ -155,9 +156,13 @@ ChargedVdb charge_vdb(const ExportJob& job, const VoxelGrid& grid, const VdbNode
   if (size.bytes > limit)
     refuse_size(
         job,
-        "the grid would take over " + size_text(limit) + " of memory, the limit --memory" +
-            (grid.has_colors(job) ? " (without colors, --gray, it takes less)" : "") +
-            (grid.name == std::string_view("mask") ? "" : " (--grid mask takes less)"),
+        "the grid would take over " + size_text(limit) + " of memory, the limit " +
+            option_text("memory") +
+            (grid.has_colors(job) ? " (without colors, " + option_text("gray") + ", it takes less)"
+                                  : "") +
+            (grid.name == std::string_view("mask")
+                 ? ""
+                 : " (" + option_text("grid", "mask") + " takes less)"),
         [&](uint32_t level) {
           return size_of(coarser(job.selection, level), CancelCheck(job)).bytes <= limit;
         },
@@ -233,22 +238,12 @@ constexpr VoxelGrid kVoxelGrids[] = {
      true},
 };
 
-// Returns the choice of --grid. Throws Error{kInvalidInput} for an unknown name.
+static_assert(kMaxExportBand == kMaxBandWidth);
+
 const VoxelGrid& voxel_grid(const ExportJob& job) {
-  const std::string& wanted = job.options.grid;
-  const int band = job.options.band;
-  if (band != 0 && wanted != "sdf")
-    throw Error(ErrorCode::kInvalidInput, "--band is given without --grid sdf: expected both");
-  if (band < 0 || band > kMaxBandWidth)
-    throw Error(ErrorCode::kInvalidInput, "--band " + std::to_string(band) + ": expected 1 to " +
-                                              std::to_string(kMaxBandWidth));
-  if (wanted.empty()) return kVoxelGrids[0];
-  std::string names;
-  for (const VoxelGrid& grid : kVoxelGrids) {
-    if (wanted == grid.name) return grid;
-    names += std::string(names.empty() ? "" : ", ") + grid.name;
-  }
-  throw Error(ErrorCode::kInvalidInput, "--grid " + wanted + ": expected one of " + names);
+  for (const VoxelGrid& grid : kVoxelGrids)
+    if (grid.name == std::string_view(name_of(job.options.grid))) return grid;
+  return kVoxelGrids[0];  // GridKind::kOfFormat
 }
 
 openvdb::Vec3SGrid::Ptr make_color_grid(const ExportJob& job, uint64_t voxels) {
@@ -309,9 +304,11 @@ ExportReport write_vdb(const ExportJob& job) {
     uint64_t min_bytes = leaf_bytes + charged.leaf_voxels * kind.value_bytes;
     openvdb::GridPtrVec grids = {grid};
     if (kind.has_colors(job)) {
-      grids.push_back(make_color_grid(job, voxels));
+      // The colors are first because vdb_render sorts the names of the grids, but not the grids:
+      // with the density first, it would take the colors for the density.
+      grids.insert(grids.begin(), make_color_grid(job, voxels));
       // Half floats are precise enough to distinguish the linear values of all sRGB bytes.
-      grids.back()->setSaveFloatAsHalf(true);
+      grids.front()->setSaveFloatAsHalf(true);
       min_bytes += leaf_bytes + voxels * 3 * kHalfBytes;
     }
     return write_grid_file(job, voxels, std::max<uint64_t>(min_bytes, 1),

@@ -1,5 +1,6 @@
 #include "server/jobs/process/export_process.h"
 
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/fields/json_fields.h"
 #include "core/format/checksum.h"
@@ -12,6 +13,11 @@
 
 namespace voxdag::server {
 namespace {
+
+// Messages of an export reach clients of the API.
+std::string spell_export_option(std::string_view name, std::string_view value) {
+  return name == "memory" ? "exports.memory of the service" : spell_as_member(name, value);
+}
 
 ExportResult write_vdag(FileSystem& files, const voxdag_reader::File& file, const JobTask& task,
                         const ExportSpec& spec, Progress& progress, const CancelToken& cancel) {
@@ -36,7 +42,7 @@ ExportResult write_format(FileSystem& files, const voxdag_reader::File& file, co
   request.memory_bytes = task.memory_bytes;
   request.gray = spec.gray;
   request.replace = true;
-  request.options = export_options_of(spec);
+  request.options = spec.options;
   const query::ExportReport report = query::export_dag(files, file, request, progress, cancel);
   ExportResult result{{}, report.voxels, report.notes};
   progress.begin_stage("checksum", report.bytes, "bytes");
@@ -52,6 +58,7 @@ ExportResult write_format(FileSystem& files, const voxdag_reader::File& file, co
 
 std::string run_export(FileSystem& caller_files, const JobTask& task, Progress& progress,
                        const CancelToken& cancel) {
+  set_option_speller(&spell_export_option);
   const ExportSpec spec = parse_export_spec(task.request);
   SpaceReserve files(caller_files, task.min_free_bytes);
   const auto file = open_global_file(kExportInput);

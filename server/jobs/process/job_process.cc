@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
 #include "scheduler/plan_build.h"
@@ -120,6 +121,7 @@ std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildCon
 std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progress,
                     const CancelToken& cancel) {
   const JobTask task = read_task(files, folder.task());
+  set_option_speller(&spell_as_member);  // messages reach clients of the API
   link_uploads(task);
   if (task.kind == JobTask::Kind::kExport) return run_export(files, task, progress, cancel);
   ConfinedFiles readable = confined(files, task, folder);

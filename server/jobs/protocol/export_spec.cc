@@ -15,15 +15,6 @@ RequestError invalid_export(const std::string& message) {
   return {RequestError::Kind::kInvalid, message};
 }
 
-void refuse_given(const ExportSpec& spec,
-                  std::initializer_list<std::pair<const char*, bool>> options,
-                  const char* expectation) {
-  for (const auto& [name, is_given] : options)
-    if (is_given)
-      throw invalid_export("'" + std::string(name) + "': expected " + expectation + ", not " +
-                           spec.to);
-}
-
 // Returns the cells of the region, which may extend beyond the grid.
 query::Region cells_of(const std::array<double, 6>& box) {
   query::Region region;
@@ -61,15 +52,10 @@ std::vector<std::string> export_spec_formats() {
 void check_export_spec(const ExportSpec& spec) {
   check_region(spec);
   if (spec.is_extract()) {
-    refuse_given(spec,
-                 {{"gray", spec.gray},
-                  {"up", spec.up != ExportSpec::Up::kOfFormat},
-                  {"grid", spec.grid != ExportSpec::Grid::kOfFormat},
-                  {"band", spec.band.has_value()},
-                  {"compact", spec.compact},
-                  {"outside", spec.outside},
-                  {"watertight", spec.watertight}},
-                 "a format of voxdag export");
+    const std::string expectation = "a format of voxdag export, not vdag";
+    if (spec.gray) throw FieldError("gray", expectation);
+    const FieldJson given = options_json(spec.options);
+    if (!given.empty()) throw FieldError(given.begin().key(), expectation);
     return;
   }
   const query::ExportFormat* format = nullptr;
@@ -78,22 +64,18 @@ void check_export_spec(const ExportSpec& spec) {
   if (!format)
     throw invalid_export("'to' is '" + printable_line(spec.to) + "': expected one of " +
                          joined(export_spec_formats()));
-  refuse_given(spec, {{"crop", spec.crop}, {"majority", spec.majority}}, "the format vdag");
-  try {
-    query::check_export_options(*format, export_options_of(spec));
-  } catch (const Error& error) {
-    throw invalid_export(error.message());
-  }
+  if (spec.crop || spec.majority)
+    throw FieldError(spec.crop ? "crop" : "majority", "the format vdag, not " + spec.to);
+  query::check_export_options(*format, spec.options);
 }
 
 ExportSpec parse_export_spec(std::string_view body) {
-  ExportSpec spec = as_request([&] {
+  return as_request([&] {
     ExportSpec read;
     read_body(body, read);
+    check_export_spec(read);
     return read;
   });
-  check_export_spec(spec);
-  return spec;
 }
 
 std::string export_spec_text(const ExportSpec& spec) { return json_text(options_json(spec)); }
@@ -116,19 +98,6 @@ query::Selection selection_of(const ExportSpec& spec, const voxdag_reader::File&
                          std::to_string(int64_t{1} << selection.grid_levels) +
                          " voxels per edge: expected a region that overlaps the grid");
   return selection;
-}
-
-query::ExportOptions export_options_of(const ExportSpec& spec) {
-  query::ExportOptions options;
-  options.up = spec.up == ExportSpec::Up::kY   ? query::UpAxis::kY
-               : spec.up == ExportSpec::Up::kZ ? query::UpAxis::kZ
-                                               : query::UpAxis::kOfFormat;
-  options.grid = name_of(spec.grid);
-  options.band = spec.band.value_or(0);
-  options.compact = spec.compact;
-  options.outside = spec.outside;
-  options.watertight = spec.watertight;
-  return options;
 }
 
 std::string export_file_name(const ExportSpec& spec, const std::string& stem) {

@@ -18,28 +18,17 @@
 namespace voxdag::server {
 
 struct ExportSpec {
-  enum class Up { kOfFormat, kY, kZ };
-  enum class Grid { kOfFormat, kDensity, kMask, kSdf };
-
   std::string to;
   std::optional<uint32_t> level;
   std::optional<std::array<double, 6>> region;
   bool world = false;
   bool gray = false;
-  Up up = Up::kOfFormat;
-  Grid grid = Grid::kOfFormat;
-  std::optional<int> band;
-  bool compact = false, outside = false, watertight = false;
+  query::ExportOptions options;
   bool crop = false, majority = false;
 
   // True if the file to write is a .vdag file.
   bool is_extract() const { return to == "vdag"; }
 };
-
-constexpr std::array<const char*, 3> enum_names(ExportSpec::Up) { return {"", "y", "z"}; }
-constexpr std::array<const char*, 4> enum_names(ExportSpec::Grid) {
-  return {"", "density", "mask", "sdf"};
-}
 
 template <class Visitor>
 void fields(Visitor& visit, ExportSpec& spec) {
@@ -51,15 +40,7 @@ void fields(Visitor& visit, ExportSpec& spec) {
         spec.region);
   visit(Field("world", "the region is in scene units"), spec.world);
   visit(Field("gray", "leave out the colors that the result may have"), spec.gray);
-  visit(Field("up", "axis of the exported file that gets the y axis of the scene"), spec.up);
-  visit(Field("grid", "vdb, nvdb: the kind of grid"), spec.grid);
-  visit(Field("band", "vdb, nvdb with the grid sdf: distances up to this number of voxels")
-            .range(1, 16),
-        spec.band);
-  visit(Field("compact", "npz: leave out the arrays that can be computed from the others"),
-        spec.compact);
-  visit(Field("outside", "glb: write only the faces that are visible from outside"), spec.outside);
-  visit(Field("watertight", "glb: write a closed mesh"), spec.watertight);
+  fields(visit, spec.options);
   visit(Field("crop", "vdag: make the smallest octree cube around the region the new grid"),
         spec.crop);
   visit(Field("majority",
@@ -69,7 +50,8 @@ void fields(Visitor& visit, ExportSpec& spec) {
 
 // Returns the formats that `to` accepts.
 std::vector<std::string> export_spec_formats();
-// Throws RequestError{kInvalid} for an unknown format, or an option that the format does not have.
+// Throws RequestError{kInvalid} for an unknown format or a wrong region, and FieldError for an
+// option that the format does not have.
 void check_export_spec(const ExportSpec& spec);
 // Parses and checks the body of the request. Throws RequestError{kInvalid}.
 ExportSpec parse_export_spec(std::string_view body);
@@ -80,8 +62,6 @@ std::string export_spec_text(const ExportSpec& spec);
 // Returns the selected part of `file`. Throws RequestError{kInvalid} if the grid of the file has
 // fewer levels, or if the region is outside the grid.
 query::Selection selection_of(const ExportSpec& spec, const voxdag_reader::File& file);
-// Returns the options of `voxdag export`. Use it only if the file to write is not a .vdag file.
-query::ExportOptions export_options_of(const ExportSpec& spec);
 // Returns the name of the (first) file to write: `stem` with the ending of the format.
 std::string export_file_name(const ExportSpec& spec, const std::string& stem);
 

@@ -81,6 +81,7 @@ export class JobOptions {
     });
     this.resolutionField =
         field("Resolution", fields.resolution, "Voxels along each edge of the cube.");
+    this.colorSwitch = checkRow(fields.flags.color, "Colors of the scene");
     this.element =
         h("details", {class: "card"}, h("summary", {}, h("h2", {}, "Options")),
           h("div", {class: "options"}, this.geometryPart(), this.runPart()));
@@ -111,7 +112,6 @@ export class JobOptions {
         field("Seed", options.seed, "A point: fills only the enclosed space around it."),
         field("Radius", options.radius, "Seals gaps of up to this many voxels."),
         checkRow(flags.skip_invalid, "Skip invalid triangles"), checkRow(flags.thin, "Thin voxels"),
-        checkRow(flags.color, "Colors of the scene"),
         attributes.map((input) => checkRow(input, kAttributes[input.value])), this.colorRow,
         field("Node order", options.order, "By first parent: faster to view."),
         field("Hash bits", options.hash_bits));

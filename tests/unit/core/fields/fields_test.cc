@@ -133,7 +133,9 @@ TEST(OptionsJson, IsRefusedByNameAndExpectation) {
       {R"({"edge":4,"options":{"speed":""}})", "'speed': expected one of slow, fast, not \"\""},
       {R"({"edge":4,"options":{"loud":1}})", "'loud': expected true or false, not 1"},
       {R"({"edge":4,"options":{"color":1}})", "'color': expected a documented member of options"},
-      {R"({"edge":4,"speed":"slow"})", "'speed': expected a documented member of the body"},
+      {R"({"edge":4,"speed":"slow"})",
+       "'speed': expected a documented member of the body; this member is unknown; did you mean "
+       "'options.speed'?"},
   };
   for (const auto& [body, part] : bodies) {
     SCOPED_TRACE(body);

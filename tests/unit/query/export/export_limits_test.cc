@@ -166,18 +166,18 @@ TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
   for (const ExportFormat& format : export_formats()) {
     const std::string name = format.name;
     if (name == "vdb" || name == "nvdb") {
-      options_.grid = "";
+      options_.grid = GridKind::kOfFormat;
       const std::string density = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
       EXPECT_NE(density.find("(--grid mask takes less). --level 8 (256 voxels per edge) fits"),
                 std::string::npos)
           << density;
-      options_.grid = "mask";
+      options_.grid = GridKind::kMask;
       const std::string message = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
       EXPECT_NE(message.find("would take over 20.00 MiB of memory"), std::string::npos) << message;
       EXPECT_NE(message.find("--level 8 (256 voxels per edge) fits"), std::string::npos) << message;
     }
   }
-  options_.grid = "";
+  options_.grid = GridKind::kOfFormat;
   const std::string message =
       refusal(*file, "glb", "a.glb", ErrorCode::kOutOfMemory, uint64_t{20} << 20);
   EXPECT_NE(message.find("a smaller --region or a coarser --level"), std::string::npos) << message;

@@ -112,10 +112,10 @@ TEST_F(ExportOptionsTest, OptionsOfOtherFormatsAreRefused) {
     exported("ply", compact);
     FAIL() << "expected an error";
   } catch (const Error& error) {
-    EXPECT_EQ(error.message(), "--compact: expected --to npz, not ply");
+    EXPECT_EQ(error.message(), "'compact': expected the format npz, not ply");
   }
   ExportOptions grid;
-  grid.grid = "density";
+  grid.grid = GridKind::kDensity;
   EXPECT_THROW(exported("svdag", grid), Error);
 }
 

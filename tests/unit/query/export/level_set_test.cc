@@ -183,8 +183,13 @@ TEST_F(LevelSetTest, ThinRegionsOfASolid) {
   const Selection thin{5, {{16, 0, 0}, {32, 32, 32}}};
   for (const ExportFormat& format : export_formats()) {
     if (std::string(format.options).find("band") == std::string::npos) continue;
-    const ExportRequest request{&format, thin, folder_.file("thin"), 64 << 20,
-                                false,   true, {.grid = "sdf"}};
+    const ExportRequest request{&format,
+                                thin,
+                                folder_.file("thin"),
+                                64 << 20,
+                                false,
+                                true,
+                                {.grid = GridKind::kSdf, .band = {}}};
     EXPECT_EQ(export_dag(system_files(), *file_, request, none, CancelToken{}).voxels, 32u * 32u);
   }
   write(voxels_where(5, [](int x, int, int) { return x == 15 || x == 16; }));
@@ -221,22 +226,26 @@ TEST_F(LevelSetTest, ExportsReportTheirVoxelsAndProgress) {
     if (std::string(format.options).find("band") == std::string::npos) continue;
     SCOPED_TRACE(format.name);
     Stages stages;
-    EXPECT_EQ(exported(format.name, {.grid = "sdf"}, stages).voxels, solid().count());
+    EXPECT_EQ(exported(format.name, {.grid = GridKind::kSdf, .band = {}}, stages).voxels,
+              solid().count());
     stages.expect_complete();
     NoProgress none;
-    const uint64_t narrow = exported(format.name, {.grid = "sdf", .band = 1}, none).bytes;
-    EXPECT_GT(exported(format.name, {.grid = "sdf", .band = 8}, none).bytes, narrow);
+    const uint64_t narrow = exported(format.name, {.grid = GridKind::kSdf, .band = 1}, none).bytes;
+    EXPECT_GT(exported(format.name, {.grid = GridKind::kSdf, .band = 8}, none).bytes, narrow);
     const auto message = [&](const ExportOptions& options, uint64_t memory_bytes) {
       return error_of([&] { exported(format.name, options, none, memory_bytes); }).message();
     };
-    EXPECT_EQ(message({.grid = "mask", .band = 2}, 64 << 20),
-              "--band is given without --grid sdf: expected both");
-    EXPECT_EQ(message({.grid = "sdf", .band = 17}, 64 << 20), "--band 17: expected 1 to 16");
-    EXPECT_NE(message({.grid = "sdf"}, 300 << 10).find("the grid would take over"),
-              std::string::npos);
+    EXPECT_EQ(message({.grid = GridKind::kMask, .band = 2}, 64 << 20),
+              "'band': expected also --grid sdf");
+    EXPECT_EQ(message({.grid = GridKind::kSdf, .band = 17}, 64 << 20),
+              "'band': expected a whole number from 1 to 16");
+    EXPECT_NE(
+        message({.grid = GridKind::kSdf, .band = {}}, 300 << 10).find("the grid would take over"),
+        std::string::npos);
     // A shell has no inside.
     write(voxels_where(5, [](int x, int y, int z) { return (x + y + z) / 3 == 11; }));
-    EXPECT_NE(message({.grid = "sdf"}, 64 << 20).find("--solid RULE"), std::string::npos);
+    EXPECT_NE(message({.grid = GridKind::kSdf, .band = {}}, 64 << 20).find("--solid RULE"),
+              std::string::npos);
     write(solid());
   }
 }

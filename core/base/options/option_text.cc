@@ -1,0 +1,44 @@
+#include "core/base/options/option_text.h"
+
+#include <atomic>
+
+namespace voxdag {
+namespace {
+
+std::atomic<OptionSpeller> g_speller{&spell_for_command_line};
+
+// Returns the value as JSON and Python write it: numbers as they are, lists of numbers in brackets,
+// and texts in quotation marks.
+std::string literal(std::string_view value, char open, char close) {
+  const bool is_numeric = value.find_first_not_of("0123456789.,-+e") == std::string_view::npos;
+  const bool is_list = value.find(',') != std::string_view::npos;
+  if (!is_numeric) return '"' + std::string(value) + '"';
+  return is_list ? open + std::string(value) + close : std::string(value);
+}
+
+}  // namespace
+
+std::string spell_for_command_line(std::string_view name, std::string_view value) {
+  std::string text = "--" + std::string(name);
+  for (char& letter : text)
+    if (letter == '_') letter = '-';
+  return value.empty() ? text : text + ' ' + std::string(value);
+}
+
+std::string spell_as_member(std::string_view name, std::string_view value) {
+  if (value.empty()) return "'" + std::string(name) + "'";
+  return '"' + std::string(name) + "\": " + literal(value, '[', ']');
+}
+
+std::string spell_as_keyword(std::string_view name, std::string_view value) {
+  const std::string text(name);
+  return value.empty() ? text : text + '=' + literal(value, '(', ')');
+}
+
+void set_option_speller(OptionSpeller speller) { g_speller = speller; }
+
+std::string option_text(std::string_view name, std::string_view value) {
+  return g_speller.load()(name, value);
+}
+
+}  // namespace voxdag

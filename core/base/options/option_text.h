@@ -1,0 +1,27 @@
+// Spells the names of options in messages. The same message can reach users of the command line, of
+// Python and of the HTTP API, who write an option in different ways.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace voxdag {
+
+// Spells an option with the given value, or without a value if `value` is empty. The name has
+// underscores, as in JSON. A list of numbers has commas and no spaces: "1,2,3".
+using OptionSpeller = std::string (*)(std::string_view name, std::string_view value);
+
+// "--hash-bits", "--level 11": the spelling of the command line, which is the default.
+std::string spell_for_command_line(std::string_view name, std::string_view value);
+// "'hash_bits'", "\"level\": 11", "\"region\": [0,0,0,4,4,4]": members of JSON.
+std::string spell_as_member(std::string_view name, std::string_view value);
+// "hash_bits", "level=11", "region=(0,0,0,4,4,4)": keyword arguments of Python.
+std::string spell_as_keyword(std::string_view name, std::string_view value);
+
+// Sets the speller of this process. Call it before the process starts threads.
+void set_option_speller(OptionSpeller speller);
+
+// Returns the option as the user of this process writes it.
+std::string option_text(std::string_view name, std::string_view value = {});
+
+}  // namespace voxdag

@@ -1,0 +1,36 @@
+#include "core/base/options/option_text.h"
+
+#include <gtest/gtest.h>
+
+namespace voxdag {
+namespace {
+
+TEST(OptionTextTest, SpellsForTheCommandLineByDefault) {
+  EXPECT_EQ(option_text("hash_bits"), "--hash-bits");
+  EXPECT_EQ(option_text("level", "11"), "--level 11");
+  EXPECT_EQ(option_text("region", "0,0,0,4,4,4"), "--region 0,0,0,4,4,4");
+}
+
+TEST(OptionTextTest, SpellsMembersOfJson) {
+  EXPECT_EQ(spell_as_member("hash_bits", ""), "'hash_bits'");
+  EXPECT_EQ(spell_as_member("level", "11"), "\"level\": 11");
+  EXPECT_EQ(spell_as_member("region", "0,-1,0.5,4,4,4"), "\"region\": [0,-1,0.5,4,4,4]");
+  EXPECT_EQ(spell_as_member("grid", "mask"), "\"grid\": \"mask\"");
+}
+
+TEST(OptionTextTest, SpellsKeywordsOfPython) {
+  EXPECT_EQ(spell_as_keyword("hash_bits", ""), "hash_bits");
+  EXPECT_EQ(spell_as_keyword("level", "11"), "level=11");
+  EXPECT_EQ(spell_as_keyword("region", "0,0,0,4,4,4"), "region=(0,0,0,4,4,4)");
+  EXPECT_EQ(spell_as_keyword("grid", "mask"), "grid=\"mask\"");
+}
+
+TEST(OptionTextTest, TheSpellerCanBeReplaced) {
+  set_option_speller(&spell_as_member);
+  EXPECT_EQ(option_text("level"), "'level'");
+  set_option_speller(&spell_for_command_line);
+  EXPECT_EQ(option_text("level"), "--level");
+}
+
+}  // namespace
+}  // namespace voxdag
