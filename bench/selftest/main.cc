@@ -13,14 +13,17 @@ namespace voxdag::selftest {
 namespace {
 
 constexpr char kUsage[] =
-    "usage: voxdag-gpu-selftest [--backend cuda|parallel-host] [--quick] [--bench [R]]\n"
+    "usage: voxdag-gpu-selftest [--backend cuda|parallel-host] [--quick|--minimal] [--bench [R]]\n"
     "                           [--workers N] [--subvolume EDGE]\n"
     "Builds scenes by the backend's three methods and by the CPU backend and compares every level\n"
-    "array. --quick: small scenes only. --bench: measures instead, at R voxels per edge (default\n"
+    "array. --quick: small scenes only. --minimal: the default method and cubes of 64^3 voxels "
+    "only,\n"
+    "for slow tools such as racecheck. --bench: measures instead, at R voxels per edge (default\n"
     "4096), with N concurrent backends (default 2).\n";
 
 struct Options {
-  bool cuda = true, quick = false, bench = false;
+  bool cuda = true, bench = false;
+  Comparison comparison = Comparison::kFull;
   BenchOptions sizes;
 };
 
@@ -36,7 +39,9 @@ bool parse(int argc, char** argv, Options& options) {
     const char* value = i + 1 < argc && argv[i + 1][0] != '-' ? argv[i + 1] : nullptr;
     const uint64_t number = value ? std::strtoull(value, nullptr, 10) : 0;
     if (word == "--quick") {
-      options.quick = true;
+      options.comparison = Comparison::kQuick;
+    } else if (word == "--minimal") {
+      options.comparison = Comparison::kMinimal;
     } else if (word == "--bench") {
       options.bench = true;
       if (number >= 64) options.sizes.grid_levels = log2_of(number), ++i;
@@ -80,7 +85,7 @@ int run(int argc, char** argv) {
     bench(subjects(options.cuda), options.sizes);
     return 0;
   }
-  const bool equal = compare_with_cpu(subjects(options.cuda), options.quick);
+  const bool equal = compare_with_cpu(subjects(options.cuda), options.comparison);
   std::puts(equal ? "ALL EQUAL" : "THERE ARE DIFFERENCES");
   return equal ? 0 : 1;
 }

@@ -17,10 +17,15 @@ struct Subject {
   std::function<std::unique_ptr<Backend>()> open;
 };
 
+enum class Comparison {
+  kFull,
+  kQuick,    // only small cubes
+  kMinimal,  // only the first subject and cubes of 64^3 voxels
+};
+
 // Builds all scenes of scenes.h with each subject and with the CPU backend. Compares every level
-// array and count, and prints a table. `quick` limits the test to small cubes. Returns true if all
-// results are equal.
-bool compare_with_cpu(const std::vector<Subject>& subjects, bool quick);
+// array and count, and prints a table. Returns true if all results are equal.
+bool compare_with_cpu(const std::vector<Subject>& subjects, Comparison comparison);
 
 struct BenchOptions {
   uint32_t grid_levels = 12;

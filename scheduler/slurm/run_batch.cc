@@ -205,7 +205,10 @@ class Task {
     std::vector<QueuedSubvolume> queue;
     for (size_t i = 0; i < plan.size(); ++i) queue.push_back({plan[i], bins[i]});
 
-    const BackendChoice backend = choose_backend(run_options, batch.rule, context_.progress);
+    double bricks = 0;
+    for (const StoredSubvolume& subvolume : plan) bricks += subvolume.weight;
+    const BackendChoice backend =
+        choose_backend(run_options, batch.rule, bricks, context_.progress);
     ExecutorOptions options;
     options.shape = batch.shape;
     options.rule = batch.rule;

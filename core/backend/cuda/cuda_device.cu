@@ -106,6 +106,16 @@ void CudaDevice::send_staging(size_t count, FixedTriangle* to, const std::string
   next_staging_ ^= 1;
 }
 
+bool CudaDevice::allocate_download_area(uint64_t bytes, const std::string& where) {
+  try {
+    download_area_ = make_pinned<std::byte>(bytes, where);
+  } catch (const OutOfBudget&) {
+    return false;
+  }
+  download_area_bytes_ = bytes;
+  return true;
+}
+
 uint64_t CudaDevice::available(const std::string& where) const {
   size_t free_bytes = 0, total_bytes = 0;
   uint64_t reserved = 0, used = 0;

@@ -2,6 +2,7 @@
 // CudaDevice for many subvolumes.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -21,6 +22,8 @@ class CudaDevice {
  public:
   static constexpr std::string_view kName = "cuda";
   static constexpr size_t kStagingTriangles = 4096;  // capacity of a staging area (288 KiB)
+  static constexpr uint64_t kMinDownloadArea = uint64_t{1} << 20;   // bytes
+  static constexpr uint64_t kMaxDownloadArea = uint64_t{64} << 20;  // bytes
 
   // `device`: index among the devices that can run this build. Throws Error{kDevice} with the
   // reason if the device does not exist or a call of the CUDA runtime fails.
@@ -41,6 +44,18 @@ class CudaDevice {
   // area that free_staging() returned last.
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
+  // Pinned host memory for downloads. It is retained from one build to the next until
+  // release_download_area(), before which all downloads must have finished.
+  // allocate_download_area() returns false if the system has not enough memory. The device must not
+  // have a download area then.
+  bool allocate_download_area(uint64_t bytes, const std::string& where);
+  void release_download_area() {
+    download_area_.reset();
+    download_area_bytes_ = 0;
+  }
+  std::byte* download_area() { return download_area_.get(); }
+  uint64_t download_area_bytes() const { return download_area_bytes_; }
+
   // Returns the free bytes of the device, including the bytes that the device's memory pool
   // retains.
   uint64_t available(const std::string& where) const;
@@ -60,6 +75,8 @@ class CudaDevice {
   Pinned<uint64_t> mailbox_;
   Staging staging_[2];
   int next_staging_ = 0;
+  Pinned<std::byte> download_area_;
+  uint64_t download_area_bytes_ = 0;
   // Last member, so that its destructor waits for pending work before the other members are
   // destroyed.
   Stream stream_;

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -24,7 +26,13 @@ class CudaSpace {
   using Array = parallel::SpaceArray<CudaSpace, T>;
 
   CudaSpace(CudaDevice& device, std::string where, MemoryBudget& budget, const CancelToken& cancel)
-      : device_(device), where_(std::move(where)), budget_(budget), cancel_(cancel) {}
+      : device_(device),
+        where_(std::move(where)),
+        budget_(budget),
+        cancel_(cancel),
+        area_charge_(budget, 0, "download area") {
+    if (!area_charge_.try_resize(device_.download_area_bytes())) device_.release_download_area();
+  }
   CudaSpace(const CudaSpace&) = delete;
 
   MemoryBudget& budget() { return budget_; }
@@ -77,8 +85,8 @@ class CudaSpace {
   }
   template <class T>
   void download(const T* from, T* to, uint64_t n) {
-    transfer(from, to, n, cudaMemcpyDeviceToHost);
-    check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize");
+    begin_download(from, to, n);
+    finish_downloads();
   }
   template <class T>
   T value(const T* from) {
@@ -86,6 +94,24 @@ class CudaSpace {
     download(from, static_cast<T*>(device_.mailbox()), 1);
     return *static_cast<T*>(device_.mailbox());
   }
+  std::byte* download_area(uint64_t bytes) {
+    if (bytes > device_.download_area_bytes()) {
+      device_.release_download_area();
+      area_charge_.try_resize(0);
+      const uint64_t rounded = std::bit_ceil(std::max(bytes, CudaDevice::kMinDownloadArea));
+      if (rounded > CudaDevice::kMaxDownloadArea || !area_charge_.try_resize(rounded) ||
+          !device_.allocate_download_area(rounded, where_)) {
+        area_charge_.try_resize(0);
+        return nullptr;
+      }
+    }
+    return device_.download_area();
+  }
+  template <class T>
+  void begin_download(const T* from, T* to, uint64_t n) {
+    transfer(from, to, n, cudaMemcpyDeviceToHost);
+  }
+  void finish_downloads() { check(cudaStreamSynchronize(stream()), "cudaStreamSynchronize"); }
   std::span<FixedTriangle> staging(FixedTriangle*, uint64_t max_count) {
     cancel_.check();
     const auto area = device_.free_staging(where_);
@@ -129,6 +155,7 @@ class CudaSpace {
   const std::string where_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
+  MemoryCharge area_charge_;  // for the device's download area
   Array<uint8_t> storage_;
   Array<uint64_t> answer_;  // one word, for the results of reductions
 };

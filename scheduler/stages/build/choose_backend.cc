@@ -5,13 +5,11 @@
 
 #include "core/base/error.h"
 #include "core/fields/field.h"
+#include "scheduler/spec/gpu_use.h"
 
 namespace voxdag {
 namespace {
 
-// Workers per GPU: enough to overlap transfers and host work of some workers with kernels of
-// others.
-constexpr unsigned kWorkersPerDevice = 4;
 // Minimum memory budget with which `auto` uses a GPU. A CUDA context has several hundred MiB of
 // resident memory that no budget contains.
 constexpr uint64_t kMinMemoryForGpu = uint64_t{2} << 30;
@@ -34,7 +32,7 @@ BackendChoice cpu_choice() {
 BackendChoice gpu_choice(const Gpus& gpus) {
   const auto next = std::make_shared<std::atomic<int>>(0);
   return {"cuda", [gpus, next] { return gpus.open((*next)++ % gpus.count); },
-          kWorkersPerDevice * static_cast<unsigned>(gpus.count)};
+          kWorkersPerGpu * static_cast<unsigned>(gpus.count)};
 }
 
 Gpus cuda_gpus(Method method) {
@@ -68,16 +66,13 @@ void check_backend(const RunOptions& options, VoxelRule rule) {
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }
 
-BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, Progress& progress) {
+BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, double bricks,
+                             Progress& progress) {
   const Method method = method_of(options);
   if (options.backend == BackendName::kParallelHost)
     return {"parallel-host", [method] { return make_parallel_host_backend(method); }};
   if (options.backend == BackendName::kCuda) return gpu_choice(cuda_gpus(method));
-  // If a method is given, `auto` means the CPU backend, because check_backend() accepts only the
-  // CPU's methods with `auto`.
-  if (options.backend == BackendName::kCpu || options.method != MethodName::kDefault ||
-      !traits_of(rule).is_parallel)
-    return cpu_choice();
+  if (gpus_to_use(options, rule, bricks) == 0) return cpu_choice();
   return choose_automatically(cuda_gpus(method), options.memory_bytes, progress);
 }
 

@@ -22,18 +22,19 @@ struct BackendChoice {
 // Error{kDevice} for `cuda` on a machine without a usable GPU.
 void check_backend(const RunOptions& options, VoxelRule rule);
 
-// Returns the backend for options that passed check_backend() and whose memory_bytes is set. `auto`
-// uses the GPUs if the budget is large enough for them, and if each GPU builds a few test
-// subvolumes exactly like the CPU backend. Otherwise it uses the CPU, with a warning if the machine
-// has a GPU that the rule could use.
-BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, Progress& progress);
+// Returns the backend for options that passed check_backend() and whose memory_bytes is set.
+// `bricks`: total weight of the subvolumes. `auto` uses the GPUs if they are faster, if the budget
+// is large enough for them, and if each GPU builds a few test subvolumes exactly like the CPU
+// backend. Otherwise it uses the CPU, with a warning if the GPUs would be faster.
+BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, double bricks,
+                             Progress& progress);
 
 // The machine's GPUs. Tests pass simulated GPUs.
 struct Gpus {
   int count = 0;
   std::function<std::unique_ptr<Backend>(int device)> open;
 };
-// Returns the backend for `auto`.
+// Returns the backend for `auto` if these GPUs are faster than the CPU.
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress);
 
 // Compares a backend with the CPU backend on this machine, because a faulty driver or device could

@@ -33,7 +33,11 @@ ExecutorOptions executor_options(BuildJob& job, const BackendChoice& backend) {
 
 void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume> planned) {
   std::vector<Cube> cubes;
-  for (const StoredSubvolume& subvolume : planned) cubes.push_back(subvolume.cube);
+  double bricks = 0;
+  for (const StoredSubvolume& subvolume : planned) {
+    cubes.push_back(subvolume.cube);
+    bricks += subvolume.weight;
+  }
   const std::vector<BinId> bins = partition_prepared(scene, cubes, job_.checkpoint, job_.stage());
   std::vector<QueuedSubvolume> queue;
   for (size_t i = 0; i < planned.size(); ++i) queue.push_back({planned[i], bins[i]});
@@ -44,7 +48,7 @@ void ThreadBuilder::build(PreparedScene& scene, std::span<const StoredSubvolume>
   Progress& progress = job_.context.progress;
   RunOptions run = job_.spec.run;
   if (job_.rows) run.backend = BackendName::kCpu;  // the only backend that fills solids
-  const BackendChoice backend = choose_backend(run, job_.spec.geometry.rule(), progress);
+  const BackendChoice backend = choose_backend(run, job_.spec.geometry.rule(), bricks, progress);
   job_.report.backend = backend.name;
   const ExecutorOptions options = executor_options(job_, backend);
   progress.begin_stage("build", options.built + queue.size(), "subvolumes");

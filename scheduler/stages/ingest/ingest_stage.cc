@@ -14,6 +14,7 @@
 #include "scene/textures/find_cutouts.h"
 #include "scheduler/solid/row_sums.h"
 #include "scheduler/spec/build_fields.h"
+#include "scheduler/spec/gpu_use.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/ingest/ingest.h"
 
@@ -31,6 +32,14 @@ constexpr double kMaxBricksPerFlatSubvolume = 128e6;
 // Bytes of memory per expected brick, enough for most flat subvolumes. If a flat subvolume
 // needs more memory than a worker has, the worker splits it.
 constexpr double kBytesPerFlatBrick = 16;
+// The same limits for a GPU, which needs about 3 ms for each subvolume in addition to the time for
+// its bricks. There are at least kMinSubvolumesPerGpuWorker for each worker, or fewer if each would
+// have less than kMinBricksPerGpuSubvolume expected bricks.
+constexpr double kMaxBricksPerGpuSubvolume = 32e6;
+constexpr double kMinBricksPerGpuSubvolume = 1e6;
+constexpr double kMinSubvolumesPerGpuWorker = 4;
+// Bytes of device memory per expected brick, enough for most subvolumes.
+constexpr double kBytesPerGpuBrick = 128;
 // A small build has about kMinSubvolumes subvolumes, or fewer if each would have less than
 // kMinBricksPerSubvolume expected bricks.
 constexpr double kMinSubvolumes = 64;
@@ -54,25 +63,53 @@ int64_t longest_edge(const BuildSpec& spec) {
   return edge;
 }
 
+// Returns the number of GPUs that probably build the subvolumes in this process.
+int planned_gpus(const BuildSpec& spec, double total_weight) {
+  // Only the CPU backend fills solids.
+  if (spec.run.cluster || solid_rule_of(spec.geometry) != SolidRule::kNone) return 0;
+  return gpus_to_use(spec.run, spec.geometry.rule(), total_weight);
+}
+
 // True if the CPU backend in this process certainly builds the subvolumes, with the memory in
-// `run`. A GPU and the tasks of a cluster can have less memory.
-bool builds_on_this_cpu(const BuildSpec& spec) {
+// `run`. The tasks of a cluster can have less memory.
+bool builds_on_this_cpu(const BuildSpec& spec, double total_weight) {
   const RunOptions& run = spec.run;
-  if (run.cluster) return false;
-  return run.backend == BackendName::kCpu ||
-         (run.backend == BackendName::kAuto && !cuda_device_available());
+  return !run.cluster && run.backend != BackendName::kParallelHost &&
+         planned_gpus(spec, total_weight) == 0;
 }
 
 // Returns the maximum weight of flat subvolumes. With this maximum, there are enough subvolumes for
 // all threads, and the tables of a subvolume fit in half of a worker's share. Returns 0 if flat
 // subvolumes have no separate maximum.
 double max_flat_weight(const BuildSpec& spec, double total_weight) {
-  if (!builds_on_this_cpu(spec)) return 0;
+  if (!builds_on_this_cpu(spec, total_weight)) return 0;
   const RunOptions& run = spec.run;
   const double subvolumes = std::max(kMinSubvolumes, kMinSubvolumesPerThread * run.threads);
   const WorkerMemory memory = WorkerMemory::divide(run.memory_bytes / 2, run.threads);
   return std::min({kMaxBricksPerFlatSubvolume, total_weight / subvolumes,
                    static_cast<double>(memory.share_bytes / 2) / kBytesPerFlatBrick});
+}
+
+// Returns the subvolumes within the limits. If there are more than kMaxBins, doubles the limits.
+std::vector<SubvolumePlan> subvolumes_within(const TopTree& top, SubvolumeLimits limits) {
+  auto plan = top.subvolumes_by_weight(limits);
+  while (plan.size() > kMaxBins) {
+    if (limits.edge <= kMaxOptionEdge) limits.edge *= 2;
+    limits.weight *= 2;
+    plan = top.subvolumes_by_weight(limits);
+  }
+  return plan;
+}
+
+SubvolumeLimits limits_for_gpus(const BuildSpec& spec, double total_weight, int gpus) {
+  const unsigned workers = std::min(spec.run.threads, kWorkersPerGpu * static_cast<unsigned>(gpus));
+  const WorkerMemory memory = WorkerMemory::divide(spec.run.memory_bytes / 2, workers);
+  const double fitting = static_cast<double>(memory.share_bytes) / kBytesPerGpuBrick;
+  const double balanced = total_weight / (kMinSubvolumesPerGpuWorker * workers);
+  return {.weight = std::max(
+              kMinBricksPerSubvolume,
+              std::min(std::clamp(balanced, kMinBricksPerGpuSubvolume, kMaxBricksPerGpuSubvolume),
+                       fitting))};
 }
 
 std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const BuildSpec& spec) {
@@ -84,17 +121,13 @@ std::vector<SubvolumePlan> choose_subvolumes(const TopTree& top, const BuildSpec
     while (plan.size() > kMaxBins) plan = top.subvolumes_by_edge(edge *= 2);
     return plan;
   }
-  SubvolumeLimits limits{.weight = std::clamp(top.total_weight() / kMinSubvolumes,
-                                              kMinBricksPerSubvolume, kMaxBricksPerSubvolume),
-                         .flat_weight = max_flat_weight(spec, top.total_weight()),
-                         .edge = longest};
-  auto plan = top.subvolumes_by_weight(limits);
-  while (plan.size() > kMaxBins) {
-    if (limits.edge <= kMaxOptionEdge) limits.edge *= 2;
-    limits.weight *= 2;
-    plan = top.subvolumes_by_weight(limits);
-  }
-  return plan;
+  if (const int gpus = planned_gpus(spec, top.total_weight()))
+    return subvolumes_within(top, limits_for_gpus(spec, top.total_weight(), gpus));
+  const SubvolumeLimits limits{.weight = std::clamp(top.total_weight() / kMinSubvolumes,
+                                                    kMinBricksPerSubvolume, kMaxBricksPerSubvolume),
+                               .flat_weight = max_flat_weight(spec, top.total_weight()),
+                               .edge = longest};
+  return subvolumes_within(top, limits);
 }
 
 TopTreeCells cells_of(const TopTree& top) { return {top.cells(), top.total_weight()}; }

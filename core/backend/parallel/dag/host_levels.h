@@ -2,6 +2,7 @@
 // because the sink must not be called for a subvolume that does not fit in the budget.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -14,68 +15,77 @@
 
 namespace voxdag::parallel {
 
-// An array of a space (space.h) on the host. For a HostSpace, this is the array itself, otherwise a
-// copy.
-template <class Space, class T>
-class HostArray {
+// The arrays of a HostSpace are on the host already. The arrays of another space are copied to one
+// area of host memory, which is the space's download area or, if they do not fit in it, pages. The
+// download area is valid until the space's device is used for the next build.
+template <class Space>
+class HostLevels {
  public:
-  HostArray() = default;
-  HostArray(Space& space, SpaceArray<Space, T>&& array) {
-    const uint64_t size = array.size();
+  HostLevels(Space& space, SpaceDag<Space>&& dag) {
     if constexpr (Space::kOnHost) {
-      array_ = std::move(array);
-      view_ = {array_.data(), size};
+      dag_ = std::move(dag);
+      view(dag_, [](const auto& array) { return std::span(array.data(), array.size()); });
     } else {
-      copy_ = pages(space.budget(), size);
-      space.download(array.data(), copy_.data(), size);
-      array = {};
-      view_ = {copy_.data(), size};
+      uint64_t bytes = 0;
+      view(dag, [&](const auto& array) {
+        bytes += bytes_of(array);
+        return std::span(array.data(), 0);
+      });
+      std::byte* next = space.download_area(bytes);
+      if (next == nullptr && bytes > 0) {
+        pages_ = pages(space.budget(), bytes);
+        next = pages_.data();
+      }
+      view(dag, [&]<class T>(const SpaceArray<Space, T>& array) {
+        T* const to = reinterpret_cast<T*>(next);
+        next += bytes_of(array);
+        space.begin_download(array.data(), to, array.size());
+        return std::span<const T>(to, array.size());
+      });
+      space.finish_downloads();
     }
   }
-  std::span<const T> view() const { return view_; }
+
+  void send(uint32_t brick_level, SubDagSink& sink) const {
+    sink.bricks(BrickLevelView{brick_masks_});
+    uint32_t level = brick_level;
+    for (const Nodes& nodes : levels_)
+      sink.nodes(NodeLevelView{--level, nodes.hashes, nodes.masks, nodes.children});
+  }
 
  private:
-  static PageBuffer<T> pages(MemoryBudget& budget, uint64_t size) {
+  struct Nodes {
+    std::span<const uint64_t> hashes;
+    std::span<const uint8_t> masks;
+    std::span<const uint32_t> children;
+  };
+
+  // Returns the bytes of an array in the area, rounded up so that the next array is aligned.
+  template <class T>
+  static uint64_t bytes_of(const SpaceArray<Space, T>& array) {
+    return (array.size() * sizeof(T) + 7) / 8 * 8;
+  }
+  static PageBuffer<std::byte> pages(MemoryBudget& budget, uint64_t size) {
     try {
-      return PageBuffer<T>(budget, size, "level arrays");
+      return PageBuffer<std::byte>(budget, size, "level arrays");
     } catch (const Error& error) {
       if (error.code() == ErrorCode::kOutOfMemory) throw OutOfBudget{};
       throw;
     }
   }
-
-  SpaceArray<Space, T> array_;
-  PageBuffer<T> copy_;
-  std::span<const T> view_;
-};
-
-template <class Space>
-class HostLevels {
- public:
-  HostLevels(Space& space, SpaceDag<Space>&& dag)
-      : brick_masks_(space, std::move(dag.bricks.masks)) {
-    for (DagLevel<Space>& level : dag.levels)
-      levels_.push_back({{space, std::move(level.hashes)},
-                         {space, std::move(level.masks)},
-                         {space, std::move(level.children)}});
+  // Sets the spans to view_of(array) for each array of `dag`.
+  template <class ViewOf>
+  void view(const SpaceDag<Space>& dag, ViewOf view_of) {
+    brick_masks_ = view_of(dag.bricks.masks);
+    levels_.clear();
+    for (const DagLevel<Space>& level : dag.levels)
+      levels_.push_back({view_of(level.hashes), view_of(level.masks), view_of(level.children)});
   }
 
-  void send(uint32_t brick_level, SubDagSink& sink) const {
-    sink.bricks(BrickLevelView{brick_masks_.view()});
-    uint32_t level = brick_level;
-    for (const Nodes& nodes : levels_)
-      sink.nodes(
-          NodeLevelView{--level, nodes.hashes.view(), nodes.masks.view(), nodes.children.view()});
-  }
-
- private:
-  struct Nodes {
-    HostArray<Space, uint64_t> hashes;
-    HostArray<Space, uint8_t> masks;
-    HostArray<Space, uint32_t> children;
-  };
-  HostArray<Space, uint64_t> brick_masks_;
-  std::vector<Nodes> levels_;
+  SpaceDag<Space> dag_;  // only for a HostSpace
+  PageBuffer<std::byte> pages_;
+  std::span<const uint64_t> brick_masks_;
+  std::vector<Nodes> levels_;  // from the bricks' parents up to the root
 };
 
 }  // namespace voxdag::parallel

@@ -22,6 +22,12 @@
 //   copy, upload, download              copy n elements: within the space, from host memory, to
 //                                       host memory
 //   value(pointer)                      returns one element to the host
+//   download_area(bytes)                returns host memory for downloads, which the next build can
+//                                       reuse, or null if there is no such memory of this size. Not
+//                                       in a space with kOnHost
+//   begin_download(from, to, n)         copies n elements to host memory. `to` must not be read
+//                                       before finish_downloads(). Not in a space with kOnHost
+//   finish_downloads()                  waits for the downloads that were begun
 //   staging(to, max_count)              returns host memory for triangles whose destination is `to`
 //   upload_staged(area, to)             copies these triangles to their destination
 //   available()                         estimates the bytes that can be allocated now
