@@ -16,6 +16,10 @@
 #define VOXDAG_SSE2
 #endif
 
+// VOXDAG_PREFETCH marks a function that only prefetches memory. GCC assumes that such a function
+// has no effect, and removes calls of it unless the function is inlined.
+#define VOXDAG_PREFETCH __attribute__((always_inline)) inline
+
 namespace voxdag {
 
 VOXDAG_HD inline int popcount64(uint64_t x) {

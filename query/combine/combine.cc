@@ -33,6 +33,8 @@ constexpr uint64_t kListShare = 1024;
 constexpr uint64_t kSorterShare = 32;
 constexpr uint64_t kValueShare = 10;
 constexpr uint64_t kWindowShare = 32;
+// The hashes of all nodes are in memory if they fit in memory_bytes / kHashShare.
+constexpr uint64_t kHashShare = 8;
 constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
 constexpr const char* kNoAttributes = "which combine cannot join";
 
@@ -131,7 +133,11 @@ class Combination {
         progress_(progress),
         cancel_(cancel),
         a_(a, work.spec.memory_bytes, cancel),
-        b_(b, work.spec.memory_bytes, cancel) {}
+        b_(b, work.spec.memory_bytes, cancel),
+        hash_space_(work.space) {
+    const uint64_t bytes = sizeof(uint64_t) * (a.dag_nodes() + b.dag_nodes());
+    if (bytes <= work.share(kHashShare)) hash_space_.list_bytes = bytes;
+  }
 
   // Writes the output. Calls before_publish() just before the output gets its final name. If
   // before_publish() throws, the output is discarded.
@@ -170,7 +176,7 @@ class Combination {
     progress_.begin_stage("join", a_.file().dag_nodes() + b_.file().dag_nodes(), "nodes");
     Join join(a_, b_, work_.space, work_.memory);
     for (uint32_t level = level_count(); level-- > 0;) {
-      joined[level] = std::make_unique<JoinedLevel>(work_.space);
+      joined[level] = std::make_unique<JoinedLevel>(work_.space, hash_space_);
       join.add_level(level, *joined[level]);
       progress_.advance(a_.level(level).node_count + b_.level(level).node_count);
     }
@@ -196,6 +202,7 @@ class Combination {
   const CancelToken& cancel_;
   DagInput a_;
   DagInput b_;
+  SpillSpace hash_space_;
 };
 
 // Writes the second file, moved by work.spec.offset into the grid of the first file, to a temporary
@@ -215,7 +222,7 @@ std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
   levels.pairs =
       MovedLevels(input, a.grid_levels(), offset, a.hash_bits(), work.space).descend(levels.bricks);
   for (size_t i = 0; i < levels.pairs.size(); ++i)
-    levels.joined.push_back(std::make_unique<JoinedLevel>(work.space));
+    levels.joined.push_back(std::make_unique<JoinedLevel>(work.space, work.space));
   out.finish(write_levels(target, target, levels, work, out, progress).octree);
   return open_global_file(path);
 }

@@ -29,7 +29,9 @@ struct LookupMemory {
 
 // The results of Join for one level of both files. A node is named by its word offset in its level.
 struct JoinedLevel {
-  explicit JoinedLevel(const SpillSpace& space) : hashes_a(space), hashes_b(space), equal(space) {}
+  // `hash_space` is the space of the lists of hashes.
+  JoinedLevel(const SpillSpace& space, const SpillSpace& hash_space)
+      : hashes_a(hash_space), hashes_b(hash_space), equal(space) {}
 
   // Hashes of all nodes of the level, in the order of the file.
   SpillList<uint64_t> hashes_a;

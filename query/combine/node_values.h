@@ -18,6 +18,7 @@
 #include <optional>
 #include <span>
 
+#include "core/base/host_device.h"
 #include "core/format/global/voxdag_reader.h"
 #include "query/combine/spill.h"
 
@@ -67,8 +68,10 @@ class NodeValues {
     if (offset >= level_words_) return {};
     return {values_[offset / 2], begins_[offset / 64] >> offset % 64 & 1};
   }
-  void prefetch(uint64_t offset) const {
-    if (offset < level_words_) __builtin_prefetch(&values_[offset / 2]);
+  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
+    if (offset >= level_words_) return;
+    __builtin_prefetch(&values_[offset / 2]);
+    __builtin_prefetch(&begins_[offset / 64]);
   }
 
   // For NodeLookups, which reads the values of a window as slots. A slot has the value for two
@@ -145,7 +148,7 @@ class NodeLookups {
   }
   // Interprets each word as a word offset, and prefetches the value at this offset. `words` are
   // words that LevelCursor::words_ahead() returns; most of them are pointers to nodes.
-  void prefetch(std::span<const uint32_t> words) const {
+  VOXDAG_PREFETCH void prefetch(std::span<const uint32_t> words) const {
     if (!values_.is_resident()) return;
     for (const uint32_t word : words) values_.prefetch(word);
   }

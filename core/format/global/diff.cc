@@ -177,7 +177,7 @@ class Differ {
   }
 
   // Prefetches the words of both nodes, so that the cache misses of a node's children overlap.
-  void prefetch(uint32_t level, const NodePair& pair) const {
+  VOXDAG_PREFETCH void prefetch(uint32_t level, const NodePair& pair) const {
     if (pair.a < a_.level(level).word_count) __builtin_prefetch(a_.level(level).words + pair.a);
     if (pair.b < b_.level(level).word_count) __builtin_prefetch(b_.level(level).words + pair.b);
   }
