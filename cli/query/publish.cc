@@ -107,14 +107,17 @@ void check(const PublishCommand& command, CommandContext& context) {
 query::PackageReport write(const PublishCommand& command, const voxdag_reader::File& file,
                            const query::PackageSpec& spec, Progress& progress,
                            CommandContext& context) {
-  const std::string poster =
-      command.no_poster ? "" : server::render_poster(file, spec, progress, context.cancel);
-  const server::PageContents contents{title_of(command), poster, url_of(command.url)};
+  const auto make_contents = [&]() -> server::PageContents {
+    const std::string poster =
+        command.no_poster ? "" : server::render_poster(file, spec, progress, context.cancel);
+    return {title_of(command), poster, url_of(command.url)};
+  };
   if (command.single_file)
-    return server::write_single_page(file, spec, contents, command.force, context.files, progress,
-                                     context.cancel);
-  return query::write_package(file, spec, server::viewer_site(contents), context.files, progress,
-                              context.cancel);
+    return server::write_single_page(file, spec, make_contents, command.force, context.files,
+                                     progress, context.cancel);
+  return query::write_package(
+      file, spec, [&] { return server::viewer_site(make_contents()); }, context.files, progress,
+      context.cancel);
 }
 
 void run(const PublishCommand& command, CommandContext& context) {

@@ -27,9 +27,11 @@ Json file_json(const PackageFile& file, bool is_pack) {
   return json;
 }
 
-// True if the file name `name` cannot lead out of the folder of the package. Names come from
-// package.json, which anyone may have written.
+// True if the file name `name` cannot lead out of the folder of the package, and is not the name of
+// a file without a hash in its name. An update of a package removes files by these names. They come
+// from package.json, which anyone may have written.
 bool is_safe_name(const std::string& name) {
+  if (name == kIndexName || name == "index.html") return false;
   if (name.empty() || name[0] == '/' || name[0] == '.') return false;
   if (name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-./") != name.npos) return false;
   return name.find("..") == name.npos && name.find("//") == name.npos;
@@ -114,10 +116,19 @@ class Parser {
            "'blocks'", "the number of blocks of a band");
     return band;
   }
+  // Adds `blocks` to `sum`, which must remain at most kMaxNumber. Without this limit, the sum of
+  // many packs could wrap around.
+  void add_blocks(uint64_t blocks, uint64_t& sum) const {
+    expect(blocks <= kMaxNumber - sum, "'blocks'", "a sum of at most 2^53");
+    sum += blocks;
+  }
   void check_sums(const PackageIndex& index) const {
     uint64_t of_bands = 0, of_packs = 0, of_pages = 0;
-    for (const PackageBand& band : index.bands) of_bands += band.blocks;
-    for (const PackageFile& pack : index.packs) of_packs += pack.blocks;
+    for (const PackageBand& band : index.bands) add_blocks(band.blocks, of_bands);
+    for (const PackageFile& pack : index.packs) {
+      expect(pack.blocks > 0, "'blocks'", "at least one block in each pack");
+      add_blocks(pack.blocks, of_packs);
+    }
     for (const DirectoryPage& page : index.pages) {
       expect(page.bytes <= index.directory.bytes - of_pages, "'pages'",
              "the sizes of the directory's pages");

@@ -84,9 +84,8 @@ void PackageReader::place_blocks(const std::string& directory) {
   uint64_t blocks = 0, at = 0;
   for (const PackageBand& band : index_.bands) blocks += band.blocks;
   uint64_t pack = 0, offset = 0, in_pack = 0;
-  std::vector<bool> is_color;
-  for (const PackageBand& band : index_.bands)
-    is_color.insert(is_color.end(), band.blocks, band.is_color);
+  size_t band = 0;
+  uint64_t in_band = 0;
   for (const DirectoryPage& page : index_.pages) {
     const uint64_t first = places_.size(), count = std::min(kPageBlocks, blocks - first),
                    colored = count_color_blocks(first, count);
@@ -104,8 +103,10 @@ void PackageReader::place_blocks(const std::string& directory) {
         ++pack;
         offset = in_pack = 0;
       }
+      for (; in_band == index_.bands[band].blocks; in_band = 0) ++band;
+      ++in_band;
       Place place{pack, offset, number_at<uint16_t>(plain, kDirectoryEntryBytes * i), 0};
-      if (is_color[first + i]) {
+      if (index_.bands[band].is_color) {
         place.code = number_at<uint32_t>(plain, low) | uint64_t{number_at<uint32_t>(plain, high)}
                                                            << 32;
         low += 4;

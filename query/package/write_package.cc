@@ -189,11 +189,12 @@ PackageReport report_of(const PackageIndex& index) {
 }  // namespace
 
 PackageReport write_package(const voxdag_reader::File& file, const PackageSpec& spec,
-                            const std::vector<ViewerFile>& viewer, FileSystem& files,
-                            Progress& progress, const CancelToken& cancel) {
+                            const ViewerMaker& make_viewer, FileSystem& files, Progress& progress,
+                            const CancelToken& cancel) {
   const WatchedFile watched(file);
   const auto run = [&] {
     PackageFolder folder(files, spec.output);
+    const std::vector<ViewerFile> viewer = make_viewer ? make_viewer() : std::vector<ViewerFile>();
     MemoryBudget budget(spec.memory_bytes);
     ScratchFolder scratch(files, folder.scratch());
     const uint64_t list_bytes = std::min(spec.memory_bytes / kRootsShare, spec.list_bytes);

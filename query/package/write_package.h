@@ -50,12 +50,17 @@ struct PackageReport {
   std::string digest;
 };
 
-// Writes the package. `viewer` has the files of the viewer: index.html, and files whose names
-// contain the hash of their contents. It may be empty. Throws Error:
-// - the errors of PackageFolder;
+// Returns the files of the viewer: index.html, and files whose names contain the hash of their
+// contents.
+using ViewerMaker = std::function<std::vector<ViewerFile>()>;
+
+// Writes the package. Calls `make_viewer` after it has checked and locked the output folder,
+// because rendering a poster takes time. A package without a viewer has an empty `make_viewer`.
+// Throws Error:
+// - the errors of PackageFolder and of `make_viewer`;
 // - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled.
 PackageReport write_package(const voxdag_reader::File& file, const PackageSpec& spec,
-                            const std::vector<ViewerFile>& viewer, FileSystem& files,
-                            Progress& progress, const CancelToken& cancel);
+                            const ViewerMaker& make_viewer, FileSystem& files, Progress& progress,
+                            const CancelToken& cancel);
 
 }  // namespace voxdag::query

@@ -56,12 +56,13 @@ uint64_t write_page(const std::string& package, const PageContents& contents,
 }  // namespace
 
 query::PackageReport write_single_page(const voxdag_reader::File& file, query::PackageSpec spec,
-                                       const PageContents& contents, bool replace,
-                                       FileSystem& files, Progress& progress,
+                                       const std::function<PageContents()>& make_contents,
+                                       bool replace, FileSystem& files, Progress& progress,
                                        const CancelToken& cancel) {
   const std::string output = spec.output, partial = output + ".partial";
   query::LockedOutputs outputs(files, {{output}, {file.path()}, replace});
   const query::TemporaryWork work(files, output + ".work-");
+  const PageContents contents = make_contents();
   spec.output = work.path() + "/package";
   query::PackageReport report = query::write_package(file, spec, {}, files, progress, cancel);
   if (report.bytes > kMaxSinglePageBytes)

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "core/io/file_system.h"
@@ -16,11 +17,12 @@ namespace voxdag::server {
 inline constexpr uint64_t kMaxSinglePageBytes = uint64_t{256} << 20;
 
 // Writes the HTML file spec.output, and returns its report. Replaces an existing file only if
-// `replace` is true. Throws the errors of write_package() and LockedOutputs, and Error{kLimit} if
-// the package is larger than kMaxSinglePageBytes.
+// `replace` is true. Calls `make_contents` after it has checked and locked the output. Throws the
+// errors of `make_contents`, write_package() and LockedOutputs, and Error{kLimit} if the package is
+// larger than kMaxSinglePageBytes.
 query::PackageReport write_single_page(const voxdag_reader::File& file, query::PackageSpec spec,
-                                       const PageContents& contents, bool replace,
-                                       FileSystem& files, Progress& progress,
+                                       const std::function<PageContents()>& make_contents,
+                                       bool replace, FileSystem& files, Progress& progress,
                                        const CancelToken& cancel);
 
 }  // namespace voxdag::server

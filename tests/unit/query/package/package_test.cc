@@ -38,7 +38,8 @@ class Package : public testing::Test {
     return spec;
   }
   PackageReport write(const voxdag_reader::File& file, const PackageSpec& spec) {
-    return write_package(file, spec, viewer_, system_files(), progress_, never_);
+    return write_package(
+        file, spec, [&] { return viewer_; }, system_files(), progress_, never_);
   }
   void write_random(const std::string& output, int edge = 128) {
     const QueryFile scene(random_voxels(5, edge));
@@ -260,6 +261,18 @@ TEST_F(Package, RefusesChangedIndexes) {
     bands += R"({"level":1,"pages":9007199254740992,"blocks":9007199254740992},)";
   EXPECT_THAT(replaced("\"bands\":[", "\"bands\":[" + bands),
               testing::HasSubstr("at most two bands of each level"));
+  // 2048 packs of 2^53 blocks: the sum of all blocks would wrap around and be correct.
+  std::string packs;
+  for (int i = 0; i < 2048; ++i)
+    packs += R"({"name":"packs/0-a.bin","bytes":0,"blocks":9007199254740992},)";
+  EXPECT_THAT(replaced("\"packs\":[", "\"packs\":[" + packs),
+              testing::HasSubstr("'blocks': expected a sum of at most 2^53"));
+  EXPECT_THAT(replaced("\"packs\":[", R"("packs":[{"name":"packs/0-a.bin","bytes":0,"blocks":0},)"),
+              testing::HasSubstr("'blocks': expected at least one block in each pack"));
+  for (const std::string name : {"index.html", "package.json"})
+    EXPECT_THAT(
+        replaced("\"packs\":[{\"name\":\"", "\"packs\":[{\"name\":\"" + name + "\",\"a\":\""),
+        testing::HasSubstr("'name': expected the name of a file in the package"));
 }
 
 // Decoding a damaged block throws Error{kCorrupt} or returns the right number of tiles.
@@ -286,6 +299,26 @@ TEST_F(Package, SurvivesDamagedBlocks) {
     }
   for (size_t size = 0; size < block.size(); ++size)
     EXPECT_THROW(decode_tile_block(block.substr(0, size), 6, 0, 1), Error);
+}
+
+// The viewer can take time to make, because it can have a poster. So it is not made if the output
+// is refused.
+TEST_F(Package, ChecksTheOutputBeforeItMakesTheViewer) {
+  const QueryFile scene(random_voxels(5, 8));
+  const auto file = open_global_file(scene.path());
+  bool is_made = false;
+  const ViewerMaker make_viewer = [&] {
+    is_made = true;
+    return viewer_;
+  };
+  write_bytes(path("file"), "mine");
+  for (const std::string output : {"file", "no/p"})
+    EXPECT_THROW(
+        write_package(*file, spec(*file, output), make_viewer, system_files(), progress_, never_),
+        Error);
+  EXPECT_FALSE(is_made);
+  write_package(*file, spec(*file, "p"), make_viewer, system_files(), progress_, never_);
+  EXPECT_TRUE(is_made);
 }
 
 TEST_F(Package, ReplacesOnlyPackages) {
