@@ -46,7 +46,9 @@ void run(const StatusCommand& command, CommandContext& context) {
   for (bool first = true;; first = false) {
     // The build can finish between two reads of its state. A finished build removes its work
     // folder.
-    if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder))) return;
+    if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder)) &&
+        WorkFolder::holder(context.files, command.work_folder).empty())
+      return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
     if (command.json)
       print_json_text(status_json(status, cluster_status_json(context.files, command.work_folder)));

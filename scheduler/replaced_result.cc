@@ -32,11 +32,14 @@ std::optional<BuildReport> report_at(FileSystem& files, const std::string& path,
 }
 
 // Returns the report of the build that wrote the output, or nullopt if it is not found. Looks at
-// this build's report path, and then at the default path, which the earlier build may have used.
+// this build's report path, and then at the default path, which the earlier build may have used. A
+// build that was killed after it renamed the output left its report in a partial file.
 std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions& run,
                                             uint64_t output_bytes) {
-  auto report = report_at(files, report_path(run), output_bytes);
-  return report ? report : report_at(files, default_report_path(run.output), output_bytes);
+  const std::string given = report_path(run), usual = default_report_path(run.output);
+  for (const std::string& path : {given, given.empty() ? "" : given + ".partial", usual})
+    if (auto report = report_at(files, path, output_bytes)) return report;
+  return std::nullopt;
 }
 
 // Returns names as the JSON of a report contains them: bytes that are not UTF-8 become U+FFFD.

@@ -275,13 +275,42 @@ void write_levels(BuildJob& job, GlobalFileWriter& out) {
   reorder_levels(job, merged, out);
 }
 
-// Runs the stages merge, reorder, attributes and publish, from the artifacts to the output file.
-// Returns false if it found damage and recover() succeeded. Then the caller must build the planned
-// subvolumes and call this function again.
-bool merge_and_publish(BuildJob& job, bool& has_restarted) {
+uint64_t shell_voxels(const BuildJob& job) {
+  uint64_t voxels = 0;
+  for (const StoredSubvolume& subvolume : job.store->leaves()) voxels += subvolume.summary.voxels;
+  return voxels;
+}
+
+// Completes the job's report and returns the text of its file.
+std::string final_report(BuildJob& job, double start_s) {
+  BuildReport& report = job.report;
+  report.stages = job.clock.stages();
+  report.warnings = job.store->warnings();
+  if (job.filled) report.solid = enclosed_report(report.merge.voxels, shell_voxels(job));
+  if (report.solid) report.solid->seed = job.spec.geometry.seed;
+  if (report.solid && job.spec.geometry.radius > 0) report.solid->radius = job.spec.geometry.radius;
+  if (report.solid) report.solid->volume = solid_volume(report.grid, report.merge.voxels);
+  report.wall_s = wall_seconds() - start_s;
+  report.cpu_s = process_cpu_seconds();
+  report.peak_rss_bytes = peak_resident_bytes();
+  return report_json(report) + "\n";
+}
+
+// Writes the report of a build whose output an earlier run published.
+void write_report(BuildJob& job, double start_s) {
+  const std::string text = final_report(job, start_s);
+  if (const std::string path = report_path(job.spec.run); !path.empty())
+    write_file_atomically(job.context.files, path, text);
+}
+
+// Runs the stages merge, reorder, attributes and publish, from the artifacts to the output file and
+// its report. Returns false if it found damage and recover() succeeded. Then the caller must build
+// the planned subvolumes and call this function again.
+bool merge_and_publish(BuildJob& job, bool& has_restarted, double start_s) {
   AttributeSections attributes(job);
   if (is_published(job, attributes)) {
     job.work.remove_merged();
+    write_report(job, start_s);
     return true;
   }
   bool reads_scene = false;  // if true, an error can come from the scene's files
@@ -293,7 +322,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
     reads_scene = true;
     attributes.add_to(out);
     reads_scene = false;
-    publish(job, out, attributes);
+    publish(job, out, attributes, [&] { return final_report(job, start_s); });
     job.work.remove_merged();
     return true;
   } catch (const Error& error) {
@@ -309,9 +338,9 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted) {
 
 // Repeats merge_and_publish() until the output is written. Builds subvolumes with damaged artifacts
 // again.
-void write_output(BuildJob& job, SubvolumeBuilder& builder) {
+void write_output(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   bool has_restarted = false;
-  for (int run = 1; !merge_and_publish(job, has_restarted); ++run) {
+  for (int run = 1; !merge_and_publish(job, has_restarted, start_s); ++run) {
     if (run == kMaxMerges)
       throw Error(ErrorCode::kCorrupt,
                   job.work.path() + ": files of built subvolumes were damaged " +
@@ -319,27 +348,6 @@ void write_output(BuildJob& job, SubvolumeBuilder& builder) {
                       " times in a row: expected a disk that returns the written data");
     if (!job.planned().empty()) build_artifacts(job, builder);
   }
-}
-
-uint64_t shell_voxels(const BuildJob& job) {
-  uint64_t voxels = 0;
-  for (const StoredSubvolume& subvolume : job.store->leaves()) voxels += subvolume.summary.voxels;
-  return voxels;
-}
-
-void write_report(BuildJob& job, double start_s) {
-  BuildReport& report = job.report;
-  report.stages = job.clock.stages();
-  report.warnings = job.store->warnings();
-  if (job.filled) report.solid = enclosed_report(report.merge.voxels, shell_voxels(job));
-  if (report.solid) report.solid->seed = job.spec.geometry.seed;
-  if (report.solid && job.spec.geometry.radius > 0) report.solid->radius = job.spec.geometry.radius;
-  if (report.solid) report.solid->volume = solid_volume(report.grid, report.merge.voxels);
-  report.wall_s = wall_seconds() - start_s;
-  report.cpu_s = process_cpu_seconds();
-  report.peak_rss_bytes = peak_resident_bytes();
-  if (const std::string path = report_path(job.spec.run); !path.empty())
-    write_file_atomically(job.context.files, path, report_json(report) + "\n");
 }
 
 void remove_work(BuildJob& job) {
@@ -354,15 +362,13 @@ void remove_finished_work(BuildJob& job) {
   if (!job.spec.run.keep_work) remove_work(job);
 }
 
-// Runs all stages of a build, writes its report, and removes finished work
-// (remove_finished_work()).
+// Runs all stages of a build, and removes finished work (remove_finished_work()).
 void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   prepare_work_folder(job);
   build_artifacts(job, builder);
   if (job.spec.run.keep_work) job.commits.commit_in_background();
-  write_output(job, builder);
+  write_output(job, builder, start_s);
   if (job.spec.run.keep_work) job.commits.commit();
-  write_report(job, start_s);
   remove_finished_work(job);
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 
@@ -13,6 +14,12 @@
 namespace voxdag {
 
 namespace {
+
+// Arrays of at most kSmallBytes use the general allocator.
+constexpr size_t kSmallBytes = size_t{32} << 10;
+constexpr size_t kAlignment = 64;  // a cache line, and the widest vector register
+
+bool is_small(size_t bytes) { return bytes <= kSmallBytes; }
 
 void* check_pages(void* pages, size_t bytes, std::string_view what) {
   if (pages == MAP_FAILED)
@@ -29,24 +36,36 @@ void* check_pages(void* pages, size_t bytes, std::string_view what) {
 }  // namespace
 
 void* allocate_pages(size_t bytes, std::string_view what) {
-  return check_pages(
-      mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes,
-      what);
+  if (!is_small(bytes))
+    return check_pages(
+        mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), bytes,
+        what);
+  const size_t rounded = (bytes + kAlignment - 1) / kAlignment * kAlignment;
+  void* const memory = std::aligned_alloc(kAlignment, rounded);
+  if (!memory) return check_pages(MAP_FAILED, bytes, what);
+  return std::memset(memory, 0, rounded);
 }
 
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what) {
 #if defined(__SANITIZE_THREAD__)
   // ThreadSanitizer does not see mremap(), and attributes memory at the new address to the thread
   // that used this address before. So copy the bytes instead.
+  const bool copies = true;
+#else
+  const bool copies = is_small(bytes) || is_small(new_bytes);
+#endif
+  if (!copies) return check_pages(mremap(pages, bytes, new_bytes, MREMAP_MAYMOVE), new_bytes, what);
   void* const grown = allocate_pages(new_bytes, what);
   std::memcpy(grown, pages, std::min(bytes, new_bytes));
   free_pages(pages, bytes);
   return grown;
-#else
-  return check_pages(mremap(pages, bytes, new_bytes, MREMAP_MAYMOVE), new_bytes, what);
-#endif
 }
 
-void free_pages(void* pages, size_t bytes) { munmap(pages, bytes); }
+void free_pages(void* pages, size_t bytes) {
+  if (is_small(bytes))
+    std::free(pages);
+  else
+    munmap(pages, bytes);
+}
 
 }  // namespace voxdag

@@ -1,6 +1,8 @@
 // A large array of zero-filled pages allocated directly from the system; arrays of 2 MiB or more
 // request huge pages. Tables and level arrays use this buffer because freed pages return to the
-// system immediately, which the general allocator does not guarantee. Not thread-safe.
+// system immediately, which the general allocator does not guarantee. Arrays of at most 32 KiB use
+// the general allocator, because a small build would otherwise make hundreds of system calls for
+// them. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +17,8 @@
 
 namespace voxdag {
 
-// Returns zero-filled pages for `bytes` bytes. Throws Error{kOutOfMemory} if the system refuses.
-// The message contains `what`, the purpose of the pages.
+// Returns zero-filled pages, or 64-byte aligned memory for a small array, for `bytes` bytes. Throws
+// Error{kOutOfMemory} if the system refuses. The message contains `what`, the purpose of the pages.
 void* allocate_pages(size_t bytes, std::string_view what);
 // Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which may have
 // changed. The new pages are zero-filled. The old pages can get new addresses, but their bytes are

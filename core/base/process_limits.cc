@@ -51,7 +51,8 @@ uint64_t min_of_groups(const std::string& membership, const std::string& mount,
     const size_t first = line.find(':'), second = line.find(':', first + 1);
     if (first == std::string::npos || second == std::string::npos) continue;
     const std::string controllers = line.substr(first + 1, second - first - 1);
-    const std::string path = line.substr(second + 1);
+    std::string path = line.substr(second + 1);
+    if (path == "/") path.clear();  // the root group is the mount point itself
     if (controllers.empty()) {
       // Systems with both versions mount version 2 at "unified".
       for (const char* root : {"", "/unified"})
@@ -59,8 +60,9 @@ uint64_t min_of_groups(const std::string& membership, const std::string& mount,
     } else if (("," + controllers + ",").find("," + controller + ",") != std::string::npos) {
       // Version 1 mounts a controller under its own name, or under the names of all controllers
       // that are mounted together with it.
-      for (const std::string& name : {controller, controllers})
-        lowest = std::min(lowest, min_up_from(mount + "/" + name, path, limit_of1));
+      lowest = std::min(lowest, min_up_from(mount + "/" + controller, path, limit_of1));
+      if (controllers != controller)
+        lowest = std::min(lowest, min_up_from(mount + "/" + controllers, path, limit_of1));
     }
   }
   return lowest;
@@ -174,9 +176,14 @@ uint64_t default_memory() {
 }
 
 unsigned default_threads() {
-  const unsigned cpus = std::max(1u, std::thread::hardware_concurrency());
-  return static_cast<unsigned>(
-      std::min<uint64_t>(cpus, cgroup_cpus(own_membership(), kCgroupMount)));
+  // Computed once, because it reads up to a dozen files, and several commands declare the number as
+  // the default of an option.
+  static const auto threads = [] {
+    const unsigned cpus = std::max(1u, std::thread::hardware_concurrency());
+    return static_cast<unsigned>(
+        std::min<uint64_t>(cpus, cgroup_cpus(own_membership(), kCgroupMount)));
+  }();
+  return threads;
 }
 
 uint64_t peak_resident_bytes() { return status_bytes("VmHWM:"); }
@@ -213,6 +220,9 @@ void return_freed_memory_to_system() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 256 << 10);
   mallopt(M_TRIM_THRESHOLD, 1 << 20);
+  // Each request for memory from the system is this much larger than needed, so there are fewer
+  // requests. Only memory that the process uses becomes resident.
+  mallopt(M_TOP_PAD, 512 << 10);
   mallopt(M_ARENA_MAX, 2);
 #endif
 }

@@ -29,6 +29,12 @@ void refuse_foreign(const std::string& path) {
                 path + " is not a regular file: expected a database that voxdag wrote");
 }
 
+// Returns the path of a database's file; "in memory" if it has no file.
+std::string file_name(sqlite3* database) {
+  const char* const name = sqlite3_db_filename(database, "main");
+  return name && *name ? name : "in memory";
+}
+
 [[noreturn]] void fail(sqlite3* database, int result, std::string path = "") {
   ErrorCode code = ErrorCode::kIo;
   std::string message = database ? sqlite3_errmsg(database) : sqlite3_errstr(result);
@@ -164,6 +170,25 @@ SqlDatabase::SqlDatabase(const std::string& path, Mode mode, int busy_ms) {
   sqlite3_busy_timeout(database, busy_ms);
 }
 
+SqlDatabase SqlDatabase::in_memory() {
+  SqlDatabase database;
+  sqlite3* handle = nullptr;
+  const int result = sqlite3_open(":memory:", &handle);
+  database.handle_.reset(handle);
+  if (result != SQLITE_OK) fail(handle, result, "in memory");
+  return database;
+}
+
+void SqlDatabase::copy_to(SqlDatabase& target) {
+  sqlite3* const to = target.handle_.get();
+  sqlite3_backup* const copy = sqlite3_backup_init(to, "main", handle_.get(), "main");
+  if (!copy) fail(to, sqlite3_errcode(to));
+  sqlite3_backup_step(copy, -1);
+  // Also returns the error of the step, if any.
+  const int result = sqlite3_backup_finish(copy);
+  if (result != SQLITE_OK) fail(to, result);
+}
+
 void SqlDatabase::execute(const std::string& sql) {
   const int result = sqlite3_exec(handle_.get(), sql.c_str(), nullptr, nullptr, nullptr);
   if (result != SQLITE_OK) fail(handle_.get(), result);
@@ -172,8 +197,7 @@ void SqlDatabase::execute(const std::string& sql) {
 int64_t SqlDatabase::integer(const std::string& sql) {
   SqlStatement statement = prepare(sql);
   if (!statement.step())
-    throw Error(ErrorCode::kCorrupt, std::string("database ") +
-                                         sqlite3_db_filename(handle_.get(), "main") +
+    throw Error(ErrorCode::kCorrupt, "database " + file_name(handle_.get()) +
                                          ": a query returned no row, expected one: " + sql);
   return statement.integer(0);
 }

@@ -61,7 +61,11 @@ class SqlDatabase {
   // milliseconds if another process has locked the database. Throws Error{kInvalidInput} if `path`
   // is a symbolic link or anything else that is not a regular file.
   SqlDatabase(const std::string& path, Mode mode, int busy_ms = 5000);
+  // Opens a new, empty database in memory.
+  static SqlDatabase in_memory();
 
+  // Replaces the contents of `target` by a copy of this database, in one transaction.
+  void copy_to(SqlDatabase& target);
   void execute(const std::string& sql);
   SqlStatement prepare(std::string_view sql) { return SqlStatement(handle_.get(), sql); }
   // Returns the first column of the first row of a query. Throws Error{kCorrupt} if the query has
@@ -69,6 +73,8 @@ class SqlDatabase {
   int64_t integer(const std::string& sql);
 
  private:
+  SqlDatabase() = default;
+
   struct Close {
     void operator()(sqlite3* database) const;
   };

@@ -14,15 +14,6 @@ std::string contents_of(const ReadableFile& file, uint64_t limit_bytes) {
   return contents;
 }
 
-// Removes a partial file after an error. Ignores further errors, because the first one is reported.
-void remove_partial(FileSystem& files, const std::string& partial) {
-  try {
-    files.remove(partial);
-  } catch (const Error&) {
-    // The next write replaces the file.
-  }
-}
-
 }  // namespace
 
 std::string parent_directory(const std::string& path) {
@@ -42,18 +33,38 @@ std::string read_own_file(FileSystem& files, const std::string& path, uint64_t l
   return contents_of(*files.open_own(path), limit_bytes);
 }
 
-void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents) {
-  const std::string partial = path + ".partial";
-  const auto file = files.create(partial);
+void remove_partial_file(FileSystem& files, const std::string& path) {
+  try {
+    files.remove(path + ".partial");
+  } catch (const Error&) {
+    // The next write replaces the file.
+  }
+}
+
+void write_partial_file(FileSystem& files, const std::string& path, std::string_view contents) {
+  const auto file = files.create(path + ".partial");
   try {
     file->write_at(0, std::as_bytes(std::span(contents)));
     file->sync();
     file->close();
-    files.rename(partial, path);
   } catch (const Error&) {
-    remove_partial(files, partial);
+    remove_partial_file(files, path);
     throw;
   }
+}
+
+void rename_partial_file(FileSystem& files, const std::string& path) {
+  try {
+    files.rename(path + ".partial", path);
+  } catch (const Error&) {
+    remove_partial_file(files, path);
+    throw;
+  }
+}
+
+void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents) {
+  write_partial_file(files, path, contents);
+  rename_partial_file(files, path);
   files.sync_directory(parent_directory(path));
 }
 

@@ -96,9 +96,12 @@ class FileSystem {
   // nothing.
   virtual bool rename_new(const std::string& from, const std::string& to) = 0;
   virtual void remove(const std::string& path) = 0;
-  // Creates the directory and its missing parents. Throws Error{kInvalidInput} if the directory or
-  // a parent exists but is a file.
+  // Creates the directory and its missing parents, and syncs their names. Throws
+  // Error{kInvalidInput} if the directory or a parent exists but is a file.
   virtual void make_directories(const std::string& path) = 0;
+  // Creates the directory, whose parent must exist, unless it exists. Does not sync its name.
+  // Throws Error{kInvalidInput} if a file has this name.
+  virtual void make_directory(const std::string& path) = 0;
   // Removes an empty directory.
   virtual void remove_directory(const std::string& path) = 0;
   virtual std::vector<DirectoryEntry> list(const std::string& path) = 0;
@@ -144,5 +147,12 @@ std::string read_own_file(FileSystem& files, const std::string& path, uint64_t l
 // Replaces the file at `path` by `contents` atomically: writes the contents to `path` + ".partial",
 // syncs and renames this file, and syncs the directory.
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);
+// The first two steps of write_file_atomically(). The first writes and syncs the file with the name
+// `path` + ".partial". The second renames it to `path`, or removes it if that fails. Afterwards the
+// caller syncs the directory.
+void write_partial_file(FileSystem& files, const std::string& path, std::string_view contents);
+void rename_partial_file(FileSystem& files, const std::string& path);
+// Removes the file that write_partial_file() wrote. Ignores errors.
+void remove_partial_file(FileSystem& files, const std::string& path);
 
 }  // namespace voxdag

@@ -36,6 +36,7 @@ class ForwardingFiles : public FileSystem {
   }
   void remove(const std::string& path) override { files_.remove(path); }
   void make_directories(const std::string& path) override { files_.make_directories(path); }
+  void make_directory(const std::string& path) override { files_.make_directory(path); }
   void remove_directory(const std::string& path) override { files_.remove_directory(path); }
   std::vector<DirectoryEntry> list(const std::string& path) override { return files_.list(path); }
   void touch(const std::string& path) override { files_.touch(path); }

@@ -150,7 +150,7 @@ class PosixWritableFile : public WritableFile {
     struct stat s {};
     constexpr off_t kPieceBytes = off_t{8} << 20;
     if (fstat(fd_.get(), &s) != 0) fail("find the size of", path_, errno);
-    for (off_t at = 0; at < s.st_size; at += kPieceBytes)
+    for (off_t at = 0; s.st_size > kPieceBytes && at < s.st_size; at += kPieceBytes)
       sync_file_range(
           fd_.get(), at, kPieceBytes,
           SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
@@ -218,8 +218,14 @@ class PosixFileSystem : public FileSystem {
     }
     const std::string parent = parent_directory(path);
     if (parent != path) make_directories(parent);
-    if (mkdir(path.c_str(), 0777) != 0 && errno != EEXIST) fail("make directory", path, errno);
+    make_directory(path);
     sync_directory(parent);
+  }
+  void make_directory(const std::string& path) override {
+    if (mkdir(path.c_str(), 0777) == 0) return;
+    if (errno != EEXIST) fail("make directory", path, errno);
+    struct stat s {};
+    if (stat(path.c_str(), &s) == 0 && !S_ISDIR(s.st_mode)) not_a_folder(path);
   }
   void remove_directory(const std::string& path) override {
     if (rmdir(path.c_str()) != 0) fail("remove directory", path, errno);

@@ -14,6 +14,8 @@
 namespace voxdag {
 namespace {
 
+// Partitions with fewer rows are merged by one thread.
+constexpr uint64_t kMinParallelRows = 16384;
 // Rows per bucket: as many as fit in a core's cache while they are sorted.
 constexpr uint64_t kBucketRows = 8192;
 // Minimum rows per bucket and run, on average. With many runs, buckets are larger than kBucketRows,
@@ -44,8 +46,12 @@ class SliceCursor {
 class PartitionMerge {
  public:
   PartitionMerge(const MergeContext& context, const LevelTask& task, HashPartition& partition,
-                 uint64_t first_position)
-      : context_(context), task_(task), partition_(partition), position_(first_position) {}
+                 unsigned workers, uint64_t first_position)
+      : context_(context),
+        task_(task),
+        partition_(partition),
+        workers_(workers),
+        position_(first_position) {}
 
   LevelExtent run() {
     make_sorters();
@@ -63,7 +69,7 @@ class PartitionMerge {
         throw;
       }
     };
-    parallel_for(context_.plan.workers, partition_.bucket_count(), merge_bucket);
+    parallel_for(workers_, partition_.bucket_count(), merge_bucket);
     if (!task_.maps.is_resident()) store_positions();
     return extent_;
   }
@@ -92,7 +98,7 @@ class PartitionMerge {
       const RowCount size = size_of(bucket);
       if (fits(size)) max.raise_to(size);
     }
-    for (unsigned worker = 0; worker < context_.plan.workers; ++worker)
+    for (unsigned worker = 0; worker < workers_; ++worker)
       sorters_.emplace_back(context_.budget, task_.format, max);
   }
 
@@ -167,6 +173,7 @@ class PartitionMerge {
   const MergeContext& context_;
   const LevelTask& task_;
   HashPartition& partition_;
+  const unsigned workers_;
   Turns turns_;        // lets the workers output buckets in their order (core/base/parallel_for.h)
   uint64_t position_;  // position of the next bucket; changed only by the worker whose turn it is
   std::vector<BucketSorter> sorters_;
@@ -187,14 +194,23 @@ uint32_t held_position_words(const LevelTask& task) {
   return task.maps.is_resident() ? 0 : task.maps.position_words();
 }
 
+// Returns the number of threads that merge a partition with these slices. Starting threads for few
+// rows takes longer than merging the rows.
+unsigned workers_for(std::span<const RunSlice> slices, unsigned max_workers) {
+  uint64_t rows = 0;
+  for (const RunSlice& slice : slices) rows += slice.size.rows;
+  return rows < kMinParallelRows ? 1 : max_workers;
+}
+
 LevelExtent merge_partition(const MergeContext& context, const LevelTask& task,
                             const HashInterval& interval, uint64_t first_position) {
   HashPartition partition(task.runs, HashPartition::slices_within(task.runs, interval), interval,
                           bucket_rows(context, task), held_position_words(task), task.memory,
                           context.budget);
-  partition.load(task.child_maps, {context.plan.workers, context.plan.worker_bytes}, context.budget,
+  const unsigned workers = workers_for(partition.slices(), context.plan.workers);
+  partition.load(task.child_maps, {workers, context.plan.worker_bytes}, context.budget,
                  context.cancel);
-  return PartitionMerge(context, task, partition, first_position).run();
+  return PartitionMerge(context, task, partition, workers, first_position).run();
 }
 
 // Called if the rows with this hash do not fit in a partition. Throws Error{kOutOfMemory} unless

@@ -3,7 +3,6 @@
 #include <set>
 #include <utility>
 
-#include "core/base/clock.h"
 #include "core/base/process_limits.h"
 
 namespace voxdag {
@@ -18,21 +17,22 @@ void refuse_warning(const Warning& warning) {
 }
 
 template <class Change>
-void JobProgress::update(bool writes_now, const Change& change) {
+void JobProgress::update(Write write_when, const Change& change) {
   std::unique_lock lock(mutex_);
   change(snapshot_);
   const double now = wall_seconds();
-  if (!writes_now && now - last_written_s_ < kWriteIntervalS) return;
-  last_written_s_ = now;
+  const bool is_due = now >= next_write_s_;
+  if (!is_due && write_when == Write::kIfDue) return;
+  if (is_due) next_write_s_ = now + kWriteIntervalS;
   lock.unlock();
-  write();
+  write(!is_due && write_when == Write::kUnlessEarly);
 }
 
 // Reads the snapshot while holding the lock of the store, so that an older snapshot never replaces
 // a newer one.
-void JobProgress::write() {
+void JobProgress::write(bool is_early) {
   std::lock_guard lock(store_mutex_);
-  if (!store_) return;
+  if (!store_ || (is_early && store_->is_in_memory())) return;
   ProgressSnapshot snapshot;
   {
     std::lock_guard snapshot_lock(mutex_);
@@ -51,7 +51,7 @@ void JobProgress::write() {
 
 void JobProgress::begin_stage(std::string_view stage, uint64_t total, std::string_view unit) {
   shown_.begin_stage(stage, total, unit);
-  update(true, [&](ProgressSnapshot& s) {
+  update(Write::kUnlessEarly, [&](ProgressSnapshot& s) {
     s.stage = stage;
     s.unit = unit;
     s.done = s.resumed_at = 0;
@@ -62,12 +62,12 @@ void JobProgress::begin_stage(std::string_view stage, uint64_t total, std::strin
 
 void JobProgress::resume_at(uint64_t done) {
   shown_.resume_at(done);
-  update(true, [&](ProgressSnapshot& s) { s.done = s.resumed_at = done; });
+  update(Write::kUnlessEarly, [&](ProgressSnapshot& s) { s.done = s.resumed_at = done; });
 }
 
 void JobProgress::advance(uint64_t count) {
   shown_.advance(count);
-  update(false, [&](ProgressSnapshot& s) { s.done += count; });
+  update(Write::kIfDue, [&](ProgressSnapshot& s) { s.done += count; });
 }
 
 void JobProgress::set_total(uint64_t total) {
@@ -78,7 +78,7 @@ void JobProgress::set_total(uint64_t total) {
 
 void JobProgress::end_stage() {
   shown_.end_stage();
-  update(true, [](ProgressSnapshot&) {});
+  update(Write::kUnlessEarly, [](ProgressSnapshot&) {});
 }
 
 void JobProgress::warn_of_input(const Warning& warning) {
@@ -89,7 +89,7 @@ void JobProgress::warn_of_input(const Warning& warning) {
 }
 
 void JobProgress::record_failure(const Error& error) {
-  update(true, [&](ProgressSnapshot& s) {
+  update(Write::kNow, [&](ProgressSnapshot& s) {
     s.last_error = std::string(error_name(error.code())) + ": " + error.message();
   });
 }

@@ -1,5 +1,6 @@
 // Forwards a build's progress, and writes it to the job store about once per second, so that
-// `voxdag status` can show it from another process. Thread-safe.
+// `voxdag status` can show it from another process. A short build ends before the first write, so
+// its store needs no file. Thread-safe.
 //
 // When a write is due, the calling thread lists the work folder and writes the row; no other thread
 // waits for it. Writing the row takes too little time to need a separate thread.
@@ -7,6 +8,7 @@
 
 #include <mutex>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/base/warning.h"
@@ -17,9 +19,15 @@ namespace voxdag {
 
 class JobProgress : public Progress {
  public:
-  // `is_strict`: warnings about the input are errors.
-  JobProgress(Progress& shown, JobStore& store, const WorkFolder& work, bool is_strict)
-      : shown_(shown), work_(work), is_strict_(is_strict), store_(&store) {}
+  // `is_strict`: warnings about the input are errors. If the store is in memory, it gets its file
+  // when progress is first reported after `first_write_s` seconds.
+  JobProgress(Progress& shown, JobStore& store, const WorkFolder& work, bool is_strict,
+              double first_write_s)
+      : shown_(shown),
+        work_(work),
+        is_strict_(is_strict),
+        next_write_s_(wall_seconds() + first_write_s),
+        store_(&store) {}
 
   void begin_stage(std::string_view stage, uint64_t total, std::string_view unit) override;
   void resume_at(uint64_t done) override;
@@ -46,17 +54,19 @@ class JobProgress : public Progress {
   void detach();
 
  private:
-  // Changes the snapshot. Writes it if a write is due or `writes_now` is set.
+  enum class Write { kIfDue, kUnlessEarly, kNow };
+  // Changes the snapshot. Writes it if a write is due. Before that, kUnlessEarly writes it if the
+  // store has a file, and kNow always writes it.
   template <class Change>
-  void update(bool writes_now, const Change& change);
-  void write();
+  void update(Write write, const Change& change);
+  void write(bool is_early);
 
   Progress& shown_;
   const WorkFolder& work_;
   const bool is_strict_;
   std::mutex mutex_;  // guards the next two members
   ProgressSnapshot snapshot_;
-  double last_written_s_ = 0;
+  double next_write_s_;
   std::mutex store_mutex_;  // guards store_; a thread that locks both mutexes locks this one first
   JobStore* store_;
 };

@@ -20,12 +20,14 @@ double JobStatus::eta_s() const {
 
 JobStatus read_job_status(FileSystem& files, const std::string& work_folder) {
   const std::string store_path = WorkFolder::store_path(work_folder);
-  if (!files.exists(store_path))
-    throw Error(ErrorCode::kNotFound,
-                work_folder + " has no job of voxdag: expected the work folder of a build");
   JobStatus status;
   status.holder = WorkFolder::holder(files, work_folder);
   status.running = !status.holder.empty();
+  if (!files.exists(store_path)) {
+    if (status.running) return status;  // a build that has just begun
+    throw Error(ErrorCode::kNotFound,
+                work_folder + " has no job of voxdag: expected the work folder of a build");
+  }
   JobStore store(store_path, JobStore::Access::kRead);
   if (const auto job = store.job()) status.geometry = job->geometry;
   for (const StoredSubvolume& subvolume : store.leaves()) {

@@ -4,6 +4,7 @@
 #include "core/db/table_rows.h"
 #include "core/format/artifact/artifact_fields.h"
 #include "core/format/checksum.h"
+#include "core/io/file_system.h"
 #include "scheduler/spec/report_fields.h"
 #include "scheduler/state/job_schema.h"
 
@@ -177,20 +178,41 @@ void write_subvolume(SqlDatabase& database, const StoredSubvolume& s,
 
 }  // namespace
 
-JobStore::JobStore(const std::string& path, Access access)
-    : database_(path, access == Access::kBuild ? SqlDatabase::Mode::kReadWrite
-                                               : SqlDatabase::Mode::kReadOnly) {
+JobStore::JobStore(const std::string& path, Access access, std::function<void()> sync_folder)
+    : path_(path),
+      sync_folder_(std::move(sync_folder)),
+      is_in_memory_(access == Access::kBuildLater && !system_files().exists(path)),
+      database_(is_in_memory_
+                    ? SqlDatabase::in_memory()
+                    : SqlDatabase(path, access == Access::kRead ? SqlDatabase::Mode::kReadOnly
+                                                                : SqlDatabase::Mode::kReadWrite)) {
+  if (access != Access::kRead && !is_in_memory_) sync_folder_();
   try {
-    if (access == Access::kBuild)
-      prepare_job_schema(database_, path);
-    else
+    if (access == Access::kRead)
       check_job_schema(database_, path);
+    else
+      prepare_job_schema(database_, path);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
       throw;
     throw Error(error.code(),
                 "job store " + path + ": " + error.message() + "; start over with --restart");
   }
+}
+
+void JobStore::move_to_disk() {
+  std::lock_guard lock(mutex_);
+  write_file();
+}
+
+void JobStore::write_file() {
+  if (!is_in_memory_) return;
+  sync_folder_();
+  SqlDatabase file(path_, SqlDatabase::Mode::kReadWrite);
+  database_.copy_to(file);
+  prepare_job_schema(file, path_);
+  database_ = std::move(file);
+  is_in_memory_ = false;
 }
 
 std::optional<JobIdentity> JobStore::job() {
@@ -246,6 +268,7 @@ std::vector<StoredSubvolume> JobStore::leaves() {
 
 void JobStore::record_built(std::span<const StoredSubvolume> built) {
   std::lock_guard lock(mutex_);
+  write_file();
   SqlTransaction transaction(database_);
   for (StoredSubvolume subvolume : built) {
     subvolume.state = SubvolumeState::kBuilt;
@@ -324,6 +347,7 @@ std::optional<std::vector<std::byte>> JobStore::ingest() {
 
 void JobStore::save_ingest(std::span<const std::byte> record) {
   std::lock_guard lock(mutex_);
+  write_file();
   SqlTransaction transaction(database_);
   put_sealed(database_, "ingest", IngestRow{{record.begin(), record.end()}});
   transaction.commit();
@@ -364,6 +388,7 @@ std::optional<StoredMerge> JobStore::merge() {
 
 void JobStore::save_merge(uint32_t level, std::span<const std::byte> state) {
   std::lock_guard lock(mutex_);
+  write_file();
   SqlTransaction transaction(database_);
   put_sealed(database_, "merge", StoredMerge{level, {state.begin(), state.end()}});
   transaction.commit();
@@ -405,6 +430,7 @@ std::vector<StageTime> JobStore::stage_times() {
 
 void JobStore::set_progress(const ProgressSnapshot& p) {
   std::lock_guard lock(mutex_);
+  write_file();
   SqlTransaction transaction(database_, Durable::kLater);
   put_row(database_, "progress", p);
   transaction.commit();

@@ -12,12 +12,15 @@
 //   4. All rows of one call are committed together or not at all.
 //
 // Thread-safe. The work folder's lock ensures that only one process writes. Readers (`voxdag
-// status`) may open the same file at any time. A subvolume can be built before its row durably
-// records this. Until then, only leaves() of the writer's object returns it as built.
+// status`) may open the same file at any time. A short build never creates the file: its rows are
+// in memory (kBuildLater) until a row must survive the process. A subvolume can be built before its
+// row durably records this. Until then, only leaves() of the writer's object returns it as built.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -88,12 +91,26 @@ struct ProgressSnapshot {
 
 class JobStore {
  public:
-  enum class Access { kBuild, kRead };
+  // kBuildLater is kBuild, but does not create a file yet if none exists at the path. Then the
+  // store is in memory until move_to_disk().
+  enum class Access { kBuild, kBuildLater, kRead };
 
   // Opens the store; kBuild also creates it. Throws Error{kCorrupt} for a damaged store,
   // Error{kInvalidInput} for another kind of database, and Error{kUnsupportedVersion} for a store
   // of another version.
-  JobStore(const std::string& path, Access access);
+  //
+  // `sync_folder` makes the names of the folder and of its files durable. The store calls it before
+  // it makes its first row durable. The function must not call this object.
+  JobStore(
+      const std::string& path, Access access, std::function<void()> sync_folder = [] {});
+
+  // True if a kBuildLater store has no file yet. Then all its rows are lost if the process ends.
+  bool is_in_memory() const { return is_in_memory_; }
+  // Copies a store in memory to a new file, durably, and uses the file from then on. Does nothing
+  // if the store already has a file. These functions call it, because they record work that a later
+  // run must not repeat, or that other processes show: record_built(), save_ingest(), save_merge()
+  // and set_progress().
+  void move_to_disk();
 
   std::optional<JobIdentity> job();
   // Replaces the job, its subvolumes, progress, merge and result by a new job whose subvolumes are
@@ -140,7 +157,11 @@ class JobStore {
 
  private:
   void update_row(const StoredSubvolume& subvolume);
+  void write_file();
 
+  const std::string path_;
+  const std::function<void()> sync_folder_;
+  std::atomic<bool> is_in_memory_;
   std::mutex mutex_;  // guards all members below
   SqlDatabase database_;
   std::map<SubvolumeId, StoredSubvolume> built_in_memory_;  // not yet recorded

@@ -75,7 +75,8 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
   // A build that is ending removes the folder, so each try creates the folder again if it is
   // missing.
   const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
-    files_.make_directories(path_);
+    files_.make_directories(parent_directory(path_));
+    files_.make_directory(path_);
     check_is_ours();
     existed_before_ = files_.exists(lock_path);
     try {
@@ -195,7 +196,14 @@ void WorkFolder::release(const SegmentRange& range) {
 
 void WorkFolder::empty_scratch() {
   for (const std::string& path : scratch_files()) files_.remove(path);
-  files_.make_directories(scratch_path());
+  files_.make_directory(scratch_path());
+  if (names_are_synced_) files_.sync_directory(path_);
+}
+
+void WorkFolder::sync_names() {
+  files_.sync_directory(parent_directory(path_));
+  files_.sync_directory(path_);
+  names_are_synced_ = true;
 }
 
 std::vector<std::string> WorkFolder::scratch_files() const {

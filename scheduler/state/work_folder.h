@@ -2,6 +2,7 @@
 // names that voxdag uses are removed from it. The folder itself is removed when it is empty.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -73,6 +74,9 @@ class WorkFolder {
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
   // Removes the merge's scratch files, and creates the scratch folder if it does not exist.
   void empty_scratch();
+  // Syncs the names of the folder and of its files. Until the first call, a power cut can remove
+  // the folder with its files. Any thread may call it.
+  void sync_names();
   // Removes the files of a cluster build. Errors are ignored.
   void remove_cluster_files();
   // Removes spilled triangles. Errors are ignored.
@@ -101,6 +105,7 @@ class WorkFolder {
   FileSystem& files_;
   const std::string path_;
   bool existed_before_ = false;
+  std::atomic<bool> names_are_synced_ = false;
   std::unique_ptr<FileLock> lock_;
   std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments with a freed part
 };

@@ -44,6 +44,19 @@ TEST_P(FineCrashTest, KilledAtRandomMoments) {
   }
 }
 
+// A build whose first checkpoint is never due: its job store has no file, so the next run starts
+// from the beginning.
+class ShortCrashTest : public CrashTest {
+ protected:
+  BuildSpec spec() const override {
+    BuildSpec spec = CrashTest::spec();
+    spec.run.checkpoint_interval_s = 1e9;
+    return spec;
+  }
+};
+
+TEST_P(ShortCrashTest, KilledAtAnyOperation) { kill_at_any_operation(); }
+
 TEST_P(CrashTest, DiskFullOrBroken) { break_disk_at_any_operation(); }
 
 // If the disk becomes full while subvolumes are built, no stored subvolume is lost.
@@ -63,9 +76,10 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   const BuildReport whole = build(one, counting);
   ASSERT_GT(whole.artifact_bytes, uint64_t{4} << 20) << "fewer than four writes of a segment";
   std::filesystem::remove(output());
-  // The fourth operation writes the first MiB of the segment. So operation 7, which fails, writes
-  // its fourth MiB.
-  FaultyFiles files({Fault::kNoSpace, 7});
+  // The first six operations create, write and sync the names of the work folder, and create the
+  // segment. The seventh writes the segment's first MiB. So operation 10, which fails, writes its
+  // fourth MiB.
+  FaultyFiles files({Fault::kNoSpace, 10});
   EXPECT_THROW(build(one, files), voxdag::Error);
   const BuildReport report = build(one, voxdag::system_files());
   EXPECT_GT(report.subvolumes_reused, 0u);
@@ -95,6 +109,7 @@ TEST_P(CrashTest, ReadsThatFail) {
 
 INSTANTIATE_TEST_SUITE_P(Ingested, CrashTest,
                          testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
+INSTANTIATE_TEST_SUITE_P(Ingested, ShortCrashTest, testing::Values(Ingested::kInMemory), name_of);
 INSTANTIATE_TEST_SUITE_P(Ingested, FineCrashTest,
                          testing::Values(Ingested::kInMemory, Ingested::kDurable), name_of);
 

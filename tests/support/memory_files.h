@@ -33,6 +33,7 @@ class MemoryFiles : public FileSystem {
   void rename(const std::string&, const std::string&) override { read_only(); }
   void remove(const std::string&) override { read_only(); }
   void make_directories(const std::string&) override { read_only(); }
+  void make_directory(const std::string&) override { read_only(); }
   void remove_directory(const std::string&) override { read_only(); }
   std::vector<DirectoryEntry> list(const std::string&) override { read_only(); }
   void touch(const std::string&) override { read_only(); }

@@ -443,11 +443,15 @@ GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned thr
 }
 
 void GlobalFileWriter::publish() {
+  rename();
+  state_->files.sync_directory(parent_directory(state_->path));
+}
+
+void GlobalFileWriter::rename() {
   State& s = *state_;
   s.file->close();
   s.files.rename(s.partial_path, s.path);
   s.retain();  // the file has its final name
-  s.files.sync_directory(parent_directory(s.path));
 }
 
 }  // namespace voxdag

@@ -70,11 +70,12 @@ bool is_partial_global_file(const ReadableFile& file);
 
 class GlobalFileWriter {
  public:
-  // Writes to "<path>.partial", which is created with the first level; publish() renames it. Levels
-  // of more than `narrow_words` words are wide: pointers into them have 64 bits. Throws Error.
+  // Writes to "<path>.partial", which is created with the first level; publish() or rename()
+  // renames it. Levels of more than `narrow_words` words are wide: pointers into them have 64 bits.
+  // Throws Error.
   GlobalFileWriter(FileSystem& files, const std::string& path, const Grid& grid, uint32_t hash_bits,
                    uint64_t narrow_words = global_layout::kNarrowLevelWords);
-  // Removes the partial file, unless publish() renamed it or sync() or resume() made it resumable.
+  // Removes the partial file, unless it was renamed, or sync() or resume() made it resumable.
   ~GlobalFileWriter();
 
   const std::string& path() const;
@@ -131,6 +132,8 @@ class GlobalFileWriter {
                          const CancelToken& cancel = CancelToken());
   // Renames the sealed file to its final name and syncs the folder.
   void publish();
+  // Renames the sealed file to its final name. The caller syncs the folder.
+  void rename();
   // Seals and publishes the file.
   GlobalFileSummary finish(const VoxelCounts& counts) {
     const GlobalFileSummary summary = seal(counts);

@@ -1,6 +1,8 @@
 #include "scheduler/stages/publish/publish_stage.h"
 
+#include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "core/io/file_system.h"
 
 namespace voxdag {
 
@@ -18,8 +20,29 @@ bool is_published(BuildJob& job, AttributeSections& attributes) {
   return true;
 }
 
-void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes) {
+namespace {
+
+// Renames the sealed file and the synced report, and syncs their folders. `report` is the path of
+// the report, or "".
+void rename_results(FileSystem& files, GlobalFileWriter& out, const std::string& report) {
+  const std::string folder = parent_directory(out.path()), other = parent_directory(report);
+  try {
+    out.rename();
+  } catch (const Error&) {
+    if (!report.empty()) remove_partial_file(files, report);
+    throw;
+  }
+  if (!report.empty()) rename_partial_file(files, report);
+  files.sync_directory(folder);
+  if (!report.empty() && other != folder) files.sync_directory(other);
+}
+
+}  // namespace
+
+void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes,
+             const std::function<std::string()>& report_text) {
   BuildReport& report = job.report;
+  FileSystem& files = job.context.files;
   Progress& progress = job.context.progress;
   progress.begin_stage("write", 1, "files");
   const GlobalFileSummary file =
@@ -27,12 +50,18 @@ void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes
                job.context.cancel);
   job.store->record_result(
       {report.output, file.sha256, file.bytes, report.merge, attributes.digest()});
-  out.publish();
-  progress.advance(1);
-  progress.end_stage();
   report.bytes = file.bytes;
   report.sha256 = file.sha256;
+  progress.advance(1);
+  progress.end_stage();
   job.clock.finish("write");
+  const std::string report_file = report_path(job.spec.run);
+  if (report_file.empty())
+    job.store
+        ->move_to_disk();  // only the recorded result shows a later run that the output is ours
+  else
+    write_partial_file(files, report_file, report_text());
+  rename_results(files, out, report_file);
 }
 
 }  // namespace voxdag

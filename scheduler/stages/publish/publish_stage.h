@@ -1,8 +1,15 @@
-// The publish stage: completes the partial global file and renames it to the output path.
+// The publish stage: completes the partial global file, renames it to the output path, and writes
+// the report.
 //
 // Resume rule: the job store records the file's SHA-256 before the rename. A later run verifies the
-// output by this digest and does not write it again.
+// output by this digest and does not write it again. The job store of a short build is lost if the
+// build is killed. A later run then builds the output again. It may replace the output, because the
+// report, which was written as "<report>.partial" before the rename, describes it
+// (scheduler/replaced_result.h).
 #pragma once
+
+#include <functional>
+#include <string>
 
 #include "core/format/global/global_writer.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
@@ -14,7 +21,10 @@ namespace voxdag {
 // sections are unchanged. If it returns true, it also fills in the report.
 bool is_published(BuildJob& job, AttributeSections& attributes);
 
-// Writes checksums, syncs and renames the file, and fills in the report.
-void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes);
+// Writes checksums, syncs the file and fills in the job's report. Then writes the text that
+// `report_text` returns to the report's file, unless the options name none, renames both files and
+// syncs their folders.
+void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes,
+             const std::function<std::string()>& report_text);
 
 }  // namespace voxdag

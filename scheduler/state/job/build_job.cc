@@ -7,19 +7,31 @@
 namespace voxdag {
 namespace {
 
-std::unique_ptr<JobStore> open_job_store(FileSystem& files, const WorkFolder& work, bool restart) {
+// Returns the access of a build to its job store. Other processes read the store of a cluster
+// build, and a kept store must exist in the end. The store of any other build can remain in memory
+// until the build has work to record.
+JobStore::Access access_of(const RunOptions& run) {
+  return run.cluster || run.keep_work ? JobStore::Access::kBuild : JobStore::Access::kBuildLater;
+}
+
+std::unique_ptr<JobStore> open_job_store(FileSystem& files, WorkFolder& work,
+                                         const RunOptions& run) {
+  const auto open = [&] {
+    return std::make_unique<JobStore>(work.store_path(), access_of(run),
+                                      [&work] { work.sync_names(); });
+  };
   try {
-    return std::make_unique<JobStore>(work.store_path(), JobStore::Access::kBuild);
+    return open();
   } catch (const Error& error) {
     const bool is_not_ours = error.code() == ErrorCode::kInvalidInput;
     const bool is_unreadable =
         error.code() == ErrorCode::kCorrupt || error.code() == ErrorCode::kUnsupportedVersion;
     // A file that is not a job store is replaced only if an earlier build used the folder.
-    if (!restart || !(is_unreadable || (is_not_ours && work.existed_before()))) throw;
+    if (!run.restart || !(is_unreadable || (is_not_ours && work.existed_before()))) throw;
   }
   for (const char* suffix : {"", "-wal", "-shm", "-journal"})
     if (files.exists(work.store_path() + suffix)) files.remove(work.store_path() + suffix);
-  return std::make_unique<JobStore>(work.store_path(), JobStore::Access::kBuild);
+  return open();
 }
 
 }  // namespace
@@ -35,8 +47,8 @@ BuildJob::BuildJob(const BuildSpec& spec_of_build, BuildScene& scene_of_build,
       budget(budget_of_build),
       output_lock(lock_output(outside, spec.run.output, spec.run.lock_wait_s)),
       work(outside, work_folder_of(spec.run), spec.run.lock_wait_s),
-      store(open_job_store(outside.files, work, spec.run.restart)),
-      progress(outside.progress, *store, work, spec.run.strict),
+      store(open_job_store(outside.files, work, spec.run)),
+      progress(outside.progress, *store, work, spec.run.strict, spec.run.checkpoint_interval_s),
       context{outside.files, progress, outside.cancel},
       checkpoint(spec, store.get(), work, context),
       start_over(spec.run.restart) {

@@ -107,11 +107,11 @@ std::string result_json(const std::string& report_text, const std::string& outpu
   return result.dump();
 }
 
-// Runs or resumes the build and returns its RESULT (docs/api.md). The report is the last file that
-// a build writes. If it exists, an earlier run finished the build, and only the work folder may
-// remain.
+// Runs or resumes the build and returns its RESULT (docs/api.md). The report and the result are the
+// last files that a build writes. If they exist, an earlier run finished the build, and only the
+// work folder may remain.
 std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
-  if (!context.files.exists(folder.report()))
+  if (!context.files.exists(folder.report()) || !context.files.exists(folder.result()))
     return result_json(report_json(run_build(spec, context)), spec.run.output);
   if (context.files.exists(folder.work()))
     WorkFolder(context, folder.work(), spec.run.lock_wait_s).remove();

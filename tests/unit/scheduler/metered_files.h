@@ -27,7 +27,10 @@ class MeteredFiles : public ForwardingFiles {
   uint64_t free_bytes = UINT64_MAX;
   std::string other_disk;  // path of a folder that is reported to be on another disk
 
+  std::map<std::string, uint64_t> directory_syncs;  // by path
+
   void forget_counts() {
+    directory_syncs.clear();
     bytes_read.clear();
     bytes_written.clear();
     bytes_released.clear();
@@ -39,6 +42,10 @@ class MeteredFiles : public ForwardingFiles {
   }
   std::unique_ptr<WritableFile> open_write(const std::string& path) override {
     return std::make_unique<Writer>(*this, ForwardingFiles::open_write(path));
+  }
+  void sync_directory(const std::string& path) override {
+    add(directory_syncs, path, 1);
+    ForwardingFiles::sync_directory(path);
   }
   uint64_t free_space(const std::string& path) override {
     return std::min(free_bytes, ForwardingFiles::free_space(path));

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,13 +11,17 @@
 
 #include "core/base/error.h"
 #include "core/format/artifact/segment_writer.h"
+#include "core/io/forwarding_files.h"
+#include "scheduler/replaced_result.h"
 #include "scheduler/run_build.h"
+#include "scheduler/spec/build_report.h"
 #include "scheduler/state/build_locks.h"
 #include "scheduler/state/job_status.h"
 #include "scheduler/state/job_store.h"
 #include "scheduler/state/work_folder.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
+#include "tests/unit/scheduler/metered_files.h"
 #include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {
@@ -383,6 +388,82 @@ TEST_F(ResumeTest, SaysHowToResume) {
   } catch (const Error& error) {
     EXPECT_NE(error.message().find("same command"), std::string::npos) << error.what();
   }
+}
+
+// A build that ends before its first checkpoint is due syncs only its two results and the names of
+// both, and creates no job store.
+TEST_F(ResumeTest, AShortBuildSyncsOnlyItsResults) {
+  BuildSpec short_build = spec();
+  short_build.run.checkpoint_interval_s = 1e9;
+  MeteredFiles files;
+  NoProgress progress;
+  CancelToken cancel;
+  run_build(short_build, {files, progress, cancel});
+  const std::string report = default_report_path(output()) + ".partial";
+  EXPECT_EQ(files.syncs,
+            (std::map<std::string, uint64_t>{{output() + ".partial", 1}, {report, 1}}));
+  EXPECT_EQ(files.directory_syncs, (std::map<std::string, uint64_t>{{folder_.path(), 1}}));
+}
+
+// Ends the process without any cleanup when the output gets its final name.
+class KillAtPublish : public ForwardingFiles {
+ public:
+  explicit KillAtPublish(const std::string& output)
+      : ForwardingFiles(system_files()), output_(output) {}
+  void rename(const std::string& from, const std::string& to) override {
+    ForwardingFiles::rename(from, to);
+    if (to == output_) _exit(0);
+  }
+  bool rename_new(const std::string& from, const std::string& to) override {
+    const bool is_renamed = ForwardingFiles::rename_new(from, to);
+    if (to == output_) _exit(0);
+    return is_renamed;
+  }
+
+ private:
+  const std::string output_;
+};
+
+// A short build that is killed between the renames of its output and of its report leaves no job
+// store. The same command may still replace the output, and another scene may not.
+TEST_F(ResumeTest, AShortBuildMayReplaceTheOutputOfAKilledOne) {
+  BuildSpec short_build = spec();
+  short_build.run.checkpoint_interval_s = 1e9;
+  const pid_t killed = fork();
+  if (killed == 0) {
+    KillAtPublish files(output());
+    NoProgress progress;
+    CancelToken cancel;
+    run_build(short_build, {files, progress, cancel});
+    _exit(1);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(killed, &status, 0), killed);
+  ASSERT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_TRUE(std::filesystem::exists(output()));
+  EXPECT_FALSE(std::filesystem::exists(default_report_path(output())));
+  EXPECT_FALSE(std::filesystem::exists(WorkFolder::store_path(work())));
+  const auto bytes = std::filesystem::file_size(output());
+  BuildSpec other = short_build;
+  other.geometry.scenes = {folder_.path() + "/other.glb"};
+  write_spheres(other.geometry.scenes[0], 1000, 2);
+  EXPECT_THROW(refuse_result_of_other_scene(system_files(), other), Error);
+  EXPECT_NO_THROW(refuse_result_of_other_scene(system_files(), short_build));
+  EXPECT_EQ(build(short_build).bytes, bytes);
+  EXPECT_TRUE(std::filesystem::exists(default_report_path(output())));
+  EXPECT_FALSE(std::filesystem::exists(work()));
+}
+
+// A running build that has no job store yet has a status.
+TEST_F(ResumeTest, ReportsThatABuildHasBegun) {
+  EXPECT_THROW(read_job_status(system_files(), work()), Error);
+  CancelToken cancel;
+  NoProgress progress;
+  const WorkFolder held({system_files(), progress, cancel}, work(), 0);
+  const JobStatus status = read_job_status(system_files(), work());
+  EXPECT_TRUE(status.running);
+  EXPECT_EQ(status.subvolumes, 0u);
+  EXPECT_NE(status_json(status, "").find("\"running\": true"), std::string::npos);
 }
 
 // Another process can read the state of an interrupted build.

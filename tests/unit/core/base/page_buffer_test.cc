@@ -65,6 +65,20 @@ TEST(PageBuffer, Grows) {
   }
 }
 
+// Small and large buffers have different allocators; a buffer that grows changes from one to the
+// other.
+TEST(PageBuffer, GrowsAcrossAllocators) {
+  MemoryBudget budget(uint64_t{1} << 20);
+  PageBuffer<uint32_t> buffer(budget, 3, "numbers");
+  for (uint32_t i = 0; i < 3; ++i) buffer[i] = i + 1;
+  for (size_t size = 9; size < (size_t{1} << 17); size *= 3) {
+    buffer.grow(size, "numbers");
+    EXPECT_EQ(reinterpret_cast<uintptr_t>(buffer.data()) % 64, 0u);
+    for (size_t i = 0; i < size; ++i) ASSERT_EQ(buffer[i], i < size / 3 ? i + 1 : 0) << size;
+    for (size_t i = 0; i < size; ++i) buffer[i] = static_cast<uint32_t>(i) + 1;
+  }
+}
+
 // An empty buffer costs nothing.
 TEST(PageBuffer, MayBeEmpty) {
   MemoryBudget budget(0);

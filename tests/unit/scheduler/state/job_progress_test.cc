@@ -61,7 +61,7 @@ TEST(JobProgressTest, WritesTheNewestSnapshot) {
   WorkFolder work({system_files(), quiet, cancel}, folder.path() + "/work", 0);
   JobStore store(work.store_path(), JobStore::Access::kBuild);
   BlockingProgress shown;
-  JobProgress progress(shown, store, work, false);
+  JobProgress progress(shown, store, work, false, 0);
   auto begun = std::async(std::launch::async, [&] { progress.begin_stage("build", 100, "parts"); });
   shown.wait_until_blocked();
   auto ended = std::async(std::launch::async, [&] { progress.end_stage(); });

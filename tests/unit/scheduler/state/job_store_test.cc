@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <functional>
 
@@ -57,6 +58,53 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   ASSERT_EQ(store.stage_times().size(), 1u);
   EXPECT_EQ(store.stage_times()[0].cpu_s, 2.5);
   EXPECT_EQ(store.stage_times()[0].largest_thread_share, 0.25);
+}
+
+// A store opened with kBuildLater has no file before a row must survive the process. Then the file
+// also has all earlier rows, and the names of the folder are synced before the file is created.
+TEST_F(JobStoreTest, CreatesItsFileWhenARowMustSurvive) {
+  int synced = 0;
+  {
+    JobStore store(path(), JobStore::Access::kBuildLater, [&] {
+      EXPECT_FALSE(std::filesystem::exists(path()));
+      ++synced;
+    });
+    store.start(job_, plan(3));
+    store.add_stage_time({"scan", 1.5, 2.5, 0.25});
+    store.add_warning({"code", "place", "message"});
+    store.record_result({});
+    EXPECT_TRUE(store.is_in_memory());
+    EXPECT_FALSE(std::filesystem::exists(path()));
+    EXPECT_EQ(synced, 0);
+    store.record_built(std::vector{built(store.leaves()[1])});
+    EXPECT_FALSE(store.is_in_memory());
+    EXPECT_EQ(synced, 1);
+    // Other processes can now read the rows; this object writes later rows to the file.
+    EXPECT_EQ(JobStore(path(), JobStore::Access::kRead).leaves()[1].state, SubvolumeState::kBuilt);
+    store.add_stage_time({"build", 1, 1, 1});
+  }
+  JobStore store(path(), JobStore::Access::kBuildLater);
+  EXPECT_FALSE(store.is_in_memory());
+  EXPECT_EQ(store.job(), job_);
+  EXPECT_EQ(store.leaves().size(), 3u);
+  EXPECT_EQ(store.stage_times().size(), 2u);
+  EXPECT_EQ(store.warnings().size(), 1u);
+  EXPECT_TRUE(store.result());
+}
+
+// Each of these calls creates the file.
+TEST_F(JobStoreTest, CheckpointsAndProgressCreateTheFile) {
+  const std::function<void(JobStore&)> calls[] = {[](JobStore& store) { store.save_ingest({}); },
+                                                  [](JobStore& store) { store.save_merge(1, {}); },
+                                                  [](JobStore& store) { store.set_progress({}); },
+                                                  [](JobStore& store) { store.move_to_disk(); }};
+  for (const auto& call : calls) {
+    JobStore store(path(), JobStore::Access::kBuildLater);
+    EXPECT_TRUE(store.is_in_memory());
+    call(store);
+    EXPECT_FALSE(store.is_in_memory());
+    for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(path() + suffix);
+  }
 }
 
 // A subvolume that is built but not recorded is planned again after forget_built_in_memory(). A
