@@ -11,43 +11,46 @@
 namespace voxdag {
 
 // Finds the first sample point of a row beyond the place where the row crosses a triangle. Sample
-// points are at multiples of a power of two. Estimates the place in floating point, and uses the
-// exact integer test (RowTest) only if a sample point is within the estimate's error.
+// points are at multiples of 2^step_log2. Estimates the place in floating point, and uses the exact
+// integer test (RowTest) only if a sample point is within the estimate's error.
 class FirstBeyond {
  public:
   template <class Test>
-  FirstBeyond(const Test& test, const FixedTriangle& t, int axis)
+  FirstBeyond(const Test& test, const FixedTriangle& t, int axis, int step_log2)
       : triangle_(t),
         axis_(axis),
         b_((axis + 1) % 3),
         c_((axis + 2) % 3),
-        at_v_(static_cast<double>(t.v[0][axis])) {
+        step_log2_(step_log2),
+        v_b_(t.v[0][b_]),
+        v_c_(t.v[0][c_]) {
+    // All estimates are in steps. A multiplication by `steps`, a power of two, is exact.
+    const double steps = 1 / static_cast<double>(int64_t{1} << step_log2);
     double slope[3];
     test.slopes(slope);
-    slope_b_ = slope[b_];
-    slope_c_ = slope[c_];
-    v_b_ = t.v[0][b_];
-    v_c_ = t.v[0][c_];
+    slope_b_ = slope[b_] * steps;
+    slope_c_ = slope[c_] * steps;
+    at_v_ = static_cast<double>(t.v[0][axis]) * steps;
     // The error of the estimate in find(): the slopes are rounded twice and the sums a few times,
     // each time by at most 2^-53 of a term. Every term is at most about `largest`.
     const double largest =
         std::abs(at_v_) + std::abs(slope_b_) * extent(t, b_) + std::abs(slope_c_) * extent(t, c_);
-    margin_ = 0.5 + largest * 0x1p-49;
+    margin_ = 0.5 * steps + largest * 0x1p-49;
   }
 
   // Returns the smallest k for which the point k * 2^step_log2 of the row through p is beyond the
   // row's crossing with the triangle. The triangle must cross the row.
-  int64_t find(const int64_t (&p)[3], int step_log2) const {
+  int64_t find(const int64_t (&p)[3]) const {
     const double at = at_v_ - slope_b_ * static_cast<double>(p[b_] - v_b_) -
                       slope_c_ * static_cast<double>(p[c_] - v_c_);
-    const double low = at - margin_, high = at + margin_;
-    if (low > -kMaxEstimate && high < kMaxEstimate) {
-      const int64_t k = floor_of(low) >> step_log2;
-      if (k == floor_of(high) >> step_log2) return k + 1;
+    if (at > -kMaxEstimate && at < kMaxEstimate) {
+      const int64_t k = floor_of(at);
+      const double part = at - static_cast<double>(k);
+      if (part > margin_ && part < 1 - margin_) return k + 1;
     }
     int64_t k = 0;
     with_row_test(triangle_, axis_,
-                  [&](const auto& test) { k = test.first_beyond(p[b_], p[c_], step_log2); });
+                  [&](const auto& test) { k = test.first_beyond(p[b_], p[c_], step_log2_); });
     return k;
   }
 
@@ -65,10 +68,9 @@ class FirstBeyond {
   }
 
   const FixedTriangle& triangle_;
-  const int axis_, b_, c_;
-  const double at_v_;
-  int64_t v_b_, v_c_;
-  double slope_b_, slope_c_, margin_;
+  const int axis_, b_, c_, step_log2_;
+  const int64_t v_b_, v_c_;
+  double at_v_, slope_b_, slope_c_, margin_;
 };
 
 // The sample rows of a closed cube: lattice lines at a distance of 2^pitch_log2 units. The
@@ -93,7 +95,7 @@ struct SampleRows {
     const int64_t base = low[axis] >> pitch_log2;
     const auto visit_rows = [&](const auto& test) {
       if (test.sign() == 0) return;
-      const FirstBeyond first_beyond(test, triangle, axis);
+      const FirstBeyond first_beyond(test, triangle, axis, pitch_log2);
       const bool first_is_c = first == (axis + 2) % 3;
       const int64_t pitch = int64_t{1} << pitch_log2;
       const auto step = test.edge_steps(!first_is_c, pitch);
@@ -106,7 +108,7 @@ struct SampleRows {
         for (int j = s.low; j <= s.high; ++j) {
           if ((edges.of[0] | edges.of[1] | edges.of[2]) >= 0) {
             p[second] = low[second] + j * pitch;
-            visit(i, j, first_beyond.find(p, pitch_log2) - 1 - base, test.sign());
+            visit(i, j, first_beyond.find(p) - 1 - base, test.sign());
           }
           for (int e = 0; e < 3; ++e) edges.of[e] += step.of[e];
         }

@@ -107,6 +107,31 @@ TEST_P(Solids, EqualTheOracleInSeveralTiles) {
   }
 }
 
+// The voxels equal the oracle's if the views of corners on the same side of a plane differ. Each
+// wall is one triangle, so the backend finds the nodes of its tiles by their plane. Sheets outside
+// the grid add to the views of the rows with y below a limit. The limits are at a border of a cube
+// of 32^3 voxels and within a block.
+TEST_P(Solids, EqualTheOracleIfViewsDifferAlongAPlane) {
+  const auto backend = open();
+  constexpr int64_t kLow = -100'001, kHigh = 200'001;
+  const oracle::Triangle x_wall{
+      {{40 * 256 + 77, kLow, kLow}, {40 * 256 + 77, kHigh, kLow}, {40 * 256 + 77, kLow, kHigh}}};
+  const oracle::Triangle z_wall{
+      {{kLow, kLow, 90 * 256 + 129}, {kHigh, kLow, 90 * 256 + 129}, {kLow, kHigh, 90 * 256 + 129}}};
+  for (const int64_t y_limit : {32 * 256 + 1, 20 * 256 + 77}) {
+    oracle::Triangles scene;
+    for (int64_t sheet = 1; sheet <= 5; ++sheet) {
+      const int64_t x = -2049 * sheet - (sheet + 1) % 2;
+      scene.push_back({{{x, kLow, kLow}, {x, y_limit, kLow}, {x, y_limit, kHigh}}});
+      scene.push_back({{{x, kLow, kLow}, {x, y_limit, kHigh}, {x, kLow, kHigh}}});
+    }
+    scene.push_back(x_wall);
+    expect_solid(*backend, scene, 7, SolidRule::kWinding);
+    scene.push_back(z_wall);
+    for (const SolidRule rule : kRules) expect_solid(*backend, scene, 7, rule);
+  }
+}
+
 // Adds a box whose faces point outward.
 void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, int64_t edge) {
   const auto corner = [&](int c) {

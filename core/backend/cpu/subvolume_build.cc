@@ -64,8 +64,11 @@ NodeRef SubvolumeBuild::build_streamed(TriangleStream& stream) {
     draw(axis_major(triangle), box);
     if (solid_) solid_->add(triangle);
   });
-  if (solid_ && !solid_->fill_tile(tile_, size_log2_of(task_), visit_all))
-    return finish_solid_root({{}, true});
+  if (solid_) {
+    solid_->finish_views();
+    if (!solid_->fill(tile_, size_log2_of(task_), box, visit_all))
+      return finish_solid_root({{}, true});
+  }
   return reducer_.reduce_bricks(tile_, size_log2_of(task_),
                                 solid_ ? solid_->full_blocks() : nullptr);
 }
@@ -107,13 +110,20 @@ NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t fir
 SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const LatticeCube& cube,
                                                       size_t first, size_t count) {
   if (count == 0) return {{}, true};
-  if (size_log2 <= kTileLog2) {
+  if (size_log2 == kTileLog2) {
     SolidNode node;
-    if (count == 1 && entries_[first].inside() &&
-        build_solid_plane(size_log2, cube, entries_[first], node))
+    if (count == 1 && entries_[first].inside() && build_solid_plane(cube, entries_[first], node))
       return node;
-    return build_solid_tile(size_log2, cube, first, count);
+    return build_solid_tile(cube, first, count);
   }
+  return split_solid(size_log2, cube, first, count,
+                     [this](auto... child) { return build_solid(child...); });
+}
+
+template <class BuildChild>
+SubvolumeBuild::SolidNode SubvolumeBuild::split_solid(int size_log2, const LatticeCube& cube,
+                                                      size_t first, size_t count,
+                                                      BuildChild build_child) {
   const size_t below = entries_used_;
   const ChildEntries entries = push_children(cube, first, count);
   SolidNode children[8];
@@ -121,7 +131,7 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const Latti
   bool is_empty = true;
   for (int c = 0; c < 8; ++c) {
     const LatticeCube child = cube.child(c);
-    children[c] = build_solid(size_log2 - 1, child, entries.first[c], entries.counts[c]);
+    children[c] = build_child(size_log2 - 1, child, entries.first[c], entries.counts[c]);
     is_empty &= children[c].is_empty;
     // Building the next children advances the running rows, so the views are read now.
     if (children[c].is_empty) views[c] = solid_->empty_cube(child);
@@ -134,41 +144,77 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const Latti
   return {tables_.add_node(size_log2, nodes), false};
 }
 
-bool SubvolumeBuild::build_solid_plane(int size_log2, const LatticeCube& cube, Entry entry,
-                                       SolidNode& node) {
-  const auto found = planes_.find_plane(triangles_, entry, size_log2);
+bool SubvolumeBuild::build_solid_plane(const LatticeCube& tile, Entry entry, SolidNode& node) {
+  const auto found = planes_.find_plane(triangles_, entry, kTileLog2);
   if (!found) return false;
   const Plane& plane = found->plane;
   int64_t f;
-  node.is_empty = !plane.offset_from(cube, size_log2, f);
+  node.is_empty = !plane.offset_from(tile, kTileLog2, f);
   if (node.is_empty) return true;
   const int axis = plane.n[0] != 0 ? 0 : plane.n[1] != 0 ? 1 : 2;
   const int sign = entry.wide() ? normal_sign(triangles_.wide(entry), axis)
                                 : normal_sign(triangles_.narrow(entry), axis);
   if (sign == 0) return false;
-  const auto sides = solid_->read_plane(plane, f, (sign > 0) != (plane.n[axis] > 0), cube);
+  const auto sides = solid_->read_plane(plane, f, (sign > 0) != (plane.n[axis] > 0), tile);
   uint64_t filled;
-  if (!sides || !planes_.build_tile(*found, sides->inner, f, size_log2, node.node, filled))
+  if (!sides || !planes_.build_tile(*found, sides->inner, f, kTileLog2, node.node, filled))
     return false;
   solid_->pass_plane(*sides, filled);
   return true;
 }
 
-SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(int size_log2, const LatticeCube& cube,
-                                                           size_t first, size_t count) {
+SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_tile(const LatticeCube& tile, size_t first,
+                                                           size_t count) {
   cancel_.check();
-  const auto visit_all = [&](const auto& visit) {
-    for (size_t i = first; i < first + count; ++i) {
-      const Entry entry = entries_[i];
-      visit(entry.wide() ? vertex_major(triangles_.wide(entry))
-                         : vertex_major(triangles_.narrow(entry)));
-    }
-  };
-  solid_->begin_tile(cube);
+  solid_->begin_tile(tile);
+  visit(first, count, [&](const FixedTriangle& triangle) { solid_->add(triangle); });
+  solid_->finish_views();
+  return build_solid_part(kTileLog2, tile, first, count);
+}
+
+SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_part(int size_log2, const LatticeCube& cube,
+                                                           size_t first, size_t count) {
+  if (count == 0) return {{}, true};
+  SolidNode node;
+  if (count == 1 && entries_[first].inside() &&
+      build_solid_part_plane(size_log2, cube, entries_[first], node))
+    return node;
+  if (!is_worth_splitting(size_log2, first, count))
+    return draw_solid_part(size_log2, cube, first, count);
+  return split_solid(size_log2, cube, first, count,
+                     [this](auto... child) { return build_solid_part(child...); });
+}
+
+bool SubvolumeBuild::build_solid_part_plane(int size_log2, const LatticeCube& cube, Entry entry,
+                                            SolidNode& node) {
+  const auto found = planes_.find_plane(triangles_, entry, size_log2);
+  if (!found) return false;
+  int64_t f;
+  node.is_empty = !found->plane.offset_from(cube, size_log2, f);
+  if (node.is_empty) return true;
+  const auto sides = solid_->read_part_plane(found->plane, f, cube);
+  uint64_t filled;
+  if (!sides || !planes_.build_tile(*found, sides->inner, f, size_log2, node.node, filled))
+    return false;
+  solid_->pass_part(*sides, filled);
+  return true;
+}
+
+SubvolumeBuild::SolidNode SubvolumeBuild::draw_solid_part(int size_log2, const LatticeCube& cube,
+                                                          size_t first, size_t count) {
   for (size_t i = first; i < first + count; ++i) draw(entries_[i], cube);
-  visit_all([&](const FixedTriangle& triangle) { solid_->add(triangle); });
-  if (!solid_->fill_tile(tile_, size_log2, visit_all)) return {{}, true};
+  const auto visit_all = [&](const auto& see) { visit(first, count, see); };
+  if (!solid_->fill(tile_, size_log2, cube, visit_all)) return {{}, true};
   return {reducer_.reduce_bricks(tile_, size_log2, solid_->full_blocks()), false};
+}
+
+template <class See>
+void SubvolumeBuild::visit(size_t first, size_t count, const See& see) const {
+  for (size_t i = first; i < first + count; ++i) {
+    const Entry entry = entries_[i];
+    see(entry.wide() ? vertex_major(triangles_.wide(entry))
+                     : vertex_major(triangles_.narrow(entry)));
+  }
 }
 
 NodeRef SubvolumeBuild::finish_solid_root(const SolidNode& root) {

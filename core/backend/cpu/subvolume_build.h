@@ -44,11 +44,24 @@ class SubvolumeBuild {
   };
   // build() for a solid.
   SolidNode build_solid(int size_log2, const LatticeCube& cube, size_t first, size_t count);
-  // Sets `node` to the node of a cube of tile size that the triangle `entry` covers and no other
-  // triangle touches. Returns false if the cube needs build_solid_tile().
-  bool build_solid_plane(int size_log2, const LatticeCube& cube, Entry entry, SolidNode& node);
-  SolidNode build_solid_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  // Sets `node` to the node of a tile that the triangle `entry` covers and no other triangle
+  // touches. Returns false if the tile needs build_solid_tile().
+  bool build_solid_plane(const LatticeCube& tile, Entry entry, SolidNode& node);
+  // Finds the views of a tile, and builds its node.
+  SolidNode build_solid_tile(const LatticeCube& tile, size_t first, size_t count);
+  // Returns the node of a tile whose views are known, or of a cube within it.
+  SolidNode build_solid_part(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  bool build_solid_part_plane(int size_log2, const LatticeCube& cube, Entry entry, SolidNode& node);
+  SolidNode draw_solid_part(int size_log2, const LatticeCube& cube, size_t first, size_t count);
+  // Builds the children of a cube by build_child(child's size_log2, child, first, count), and
+  // combines them. The entries of the cube are entries_[first, first + count).
+  template <class BuildChild>
+  SolidNode split_solid(int size_log2, const LatticeCube& cube, size_t first, size_t count,
+                        BuildChild build_child);
   NodeRef finish_solid_root(const SolidNode& root);
+  // Calls see(triangle) for the triangles entries_[first, first + count).
+  template <class See>
+  void visit(size_t first, size_t count, const See& see) const;
 
   // The entries of a cube's child c are entries_[first[c], first[c] + counts[c]).
   struct ChildEntries {

@@ -17,6 +17,7 @@
 
 #include <cstdint>
 
+#include "core/backend/cpu/memo/memo_gate.h"
 #include "core/backend/cpu/raster/voxel_block.h"
 #include "core/dag/consing/pooled_memory.h"
 
@@ -33,20 +34,8 @@ class BlockMemo {
 
   explicit BlockMemo(PooledMemory& memory);
 
-  // True if the memo should be used for the next `count` blocks, which count as lookups; false
-  // while the memo is bypassed (kBypass).
-  bool is_worthwhile(int count) {
-    if (bypassed_ > 0) {
-      bypassed_ -= count;
-      return false;
-    }
-    lookups_ += count;
-    if (lookups_ >= kWindow) {
-      if (misses_ > lookups_ - lookups_ / 4) bypassed_ = kBypass;
-      lookups_ = misses_ = 0;
-    }
-    return true;
-  }
+  // True if the memo should be used for the next `count` blocks, which count as lookups.
+  bool is_worthwhile(int count) { return gate_.is_open(count); }
   void prefetch(uint64_t key) const { __builtin_prefetch(&blocks_[slot_of(key)]); }
   // Returns the node of a block, or null if the block is not in the memo. The block must not be
   // empty, because a free slot looks like an empty block. `key`: block_key() of the block.
@@ -60,16 +49,11 @@ class BlockMemo {
     const uint64_t slot = slot_of(key);
     blocks_[slot] = block;
     nodes_[slot] = node;
-    ++misses_;
+    gate_.count_miss();
     if (++inserted_ == slots_) grow();
   }
 
  private:
-  // After each window of kWindow lookups in which more than three quarters missed, the memo is
-  // bypassed for kBypass blocks.
-  static constexpr int64_t kWindow = 1024;
-  static constexpr int64_t kBypass = 16 * kWindow;
-
   uint64_t slot_of(uint64_t key) const { return key * 0x9e3779b97f4a7c15ull >> shift_; }
   bool fits_budget(uint64_t slots) const;
   void set_slots(uint64_t slots);
@@ -82,8 +66,7 @@ class BlockMemo {
   uint64_t slots_ = 0;     // a power of two
   uint64_t inserted_ = 0;  // since the last growth
   int shift_ = 0;
-  int64_t lookups_ = 0, misses_ = 0;  // in the current window
-  int64_t bypassed_ = 0;              // blocks until the memo is used again
+  MemoGate gate_;
 };
 
 }  // namespace voxdag::cpu

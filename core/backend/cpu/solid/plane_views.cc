@@ -18,6 +18,23 @@ bool ties_are_above(const Plane& plane) {
 bool is_inside(int32_t views) { return UnitViews{views, 1}.is_inside(); }
 bool is_disputed(int32_t views) { return UnitViews{views, 1}.is_disputed(); }
 
+// Returns the plane's value at the low corner of a cube. A corner of a block is above the plane iff
+// its value is >= 0. `f` is the plane's offset from the cube.
+int64_t value_at_low(const Plane& plane, int64_t f) {
+  return f - (plane.fractional || ties_are_above(plane) ? 0 : 1);
+}
+
+// `has[side]`: a corner of a block is on this side (0: below, 1: above). `views[side]`: the sum of
+// the three views from these corners. If no corner is on a side, this side counts as outside. All
+// its voxels are in the shell, so there is nothing to fill.
+std::optional<PlaneViews::Sides> sides_of(const bool (&has)[2], const int32_t (&views)[2]) {
+  const InnerSides inner{has[0] && is_inside(views[0]), has[1] && is_inside(views[1])};
+  const bool below = inner.below && is_disputed(views[0]);
+  const bool above = inner.above && is_disputed(views[1]);
+  if (inner.below && inner.above && below != above) return {};
+  return PlaneViews::Sides{inner, below || above};
+}
+
 }  // namespace
 
 bool PlaneViews::Face::has(bool is_above) const {
@@ -34,7 +51,7 @@ PlaneViews::Face PlaneViews::face(int axis, bool is_high) const {
 
 std::optional<PlaneViews::Sides> PlaneViews::read(const Plane& plane, int64_t f, bool is_turned,
                                                   const int (&tile)[3]) {
-  base_ = f - (plane.fractional || ties_are_above(plane) ? 0 : 1);
+  base_ = value_at_low(plane, f);
   int64_t lowest = base_, highest = base_;
   for (int a = 0; a < 3; ++a) {
     step_[a] = plane.n[a] * (int64_t{1} << kBlockLog2);
@@ -47,13 +64,28 @@ std::optional<PlaneViews::Sides> PlaneViews::read(const Plane& plane, int64_t f,
   int32_t sums[2] = {0, 0};
   for (const auto& views : views_)
     for (int side = 0; side < 2; ++side) sums[side] += views[side];
-  // If no corner of a block is on a side of the plane, this side counts as outside. All its voxels
-  // are in the shell, so there is nothing to fill.
-  const InnerSides inner{lowest < 0 && is_inside(sums[0]), highest >= 0 && is_inside(sums[1])};
-  const bool below = inner.below && is_disputed(sums[0]);
-  const bool above = inner.above && is_disputed(sums[1]);
-  if (inner.below && inner.above && below != above) return {};
-  return Sides{inner, below || above};
+  return sides_of({lowest < 0, highest >= 0}, sums);
+}
+
+std::optional<PlaneViews::Sides> PlaneViews::read_part(const TileViews& views, const Plane& plane,
+                                                       int64_t f, const int (&low)[3], int edge) {
+  int64_t step[3];
+  for (int a = 0; a < 3; ++a) step[a] = plane.n[a] * (int64_t{1} << kBlockLog2);
+  const int64_t base = value_at_low(plane, f);
+  bool has[2] = {false, false};
+  int32_t sums[2] = {0, 0};
+  for (int x = 0; x <= edge; ++x)
+    for (int y = 0; y <= edge; ++y) {
+      int64_t value = base + x * step[0] + y * step[1];
+      for (int z = 0; z <= edge; ++z, value += step[2]) {
+        const bool is_above = value >= 0;
+        const int32_t sum = views.at(low[0] + x, low[1] + y, low[2] + z);
+        if (!has[is_above]) sums[is_above] = sum;
+        has[is_above] = true;
+        if (sums[is_above] != sum) return {};
+      }
+    }
+  return sides_of(has, sums);
 }
 
 // Sets views_[axis] to the views of the rows below and above the plane. Returns false if rows on

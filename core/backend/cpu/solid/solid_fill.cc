@@ -26,7 +26,7 @@ SolidFill::SolidFill(const SubvolumeTask& task, const Kernels& kernels, PooledMe
       tile_edge_(kUnitsPerVoxel << tile_log2_of(task)),
       running_(memory, *task.solid, tiles_of(task), blocks_of(task)),
       plane_views_(rule_, running_),
-      filler_(kernels, rule_, task.grid_levels),
+      filler_(kernels, rule_, task.grid_levels, memory),
       rows_{{0, 0, 0}, sample_pitch_log2(task.grid_levels), blocks_of(task)} {}
 
 std::optional<PlaneViews::Sides> SolidFill::read_plane(const Plane& plane, int64_t f,
@@ -38,6 +38,10 @@ std::optional<PlaneViews::Sides> SolidFill::read_plane(const Plane& plane, int64
 
 void SolidFill::pass_plane(const PlaneViews::Sides& sides, uint64_t filled) {
   plane_views_.advance();
+  pass_part(sides, filled);
+}
+
+void SolidFill::pass_part(const PlaneViews::Sides& sides, uint64_t filled) {
   filled_.filled += filled;
   if (sides.is_disputed) filled_.disputed += filled;
 }
@@ -48,16 +52,33 @@ void SolidFill::begin_tile(const LatticeCube& tile) {
   views_.begin(rows_);
 }
 
-bool SolidFill::fill_tile(TileBricks& bricks, int size_log2,
-                          const TileFiller::ForEachTriangle& for_each_triangle) {
+void SolidFill::finish_views() {
   int tile[3];
   position_of(tile_, tile);
   views_.finish(rule_, running_, tile);
-  return filler_.fill(bricks, size_log2, tile_.low, views_, for_each_triangle, filled_);
+}
+
+std::optional<PlaneViews::Sides> SolidFill::read_part_plane(const Plane& plane, int64_t f,
+                                                            const LatticeCube& cube) const {
+  int low[3];
+  position_in_tile(cube, low);
+  return PlaneViews::read_part(views_, plane, f, low,
+                               static_cast<int>(cube.edge >> rows_.pitch_log2));
+}
+
+bool SolidFill::fill(TileBricks& bricks, int size_log2, const LatticeCube& cube,
+                     const TileFiller::ForEachTriangle& for_each_triangle) {
+  int low[3];
+  position_in_tile(cube, low);
+  return filler_.fill(bricks, size_log2, cube.low, views_, low, for_each_triangle, filled_);
 }
 
 UnitViews SolidFill::empty_cube(const LatticeCube& cube) {
   int low[3];
+  if (cube.edge < tile_edge_) {
+    position_in_tile(cube, low);
+    return views_.corners_of(low, static_cast<int>(cube.edge >> rows_.pitch_log2));
+  }
   position_of(cube, low);
   return running_.corners_of(low, static_cast<int>(cube.edge / tile_edge_));
 }
@@ -71,6 +92,11 @@ NodeRef SolidFill::decide(const UnitViews& unit, int size_log2) {
 
 void SolidFill::position_of(const LatticeCube& cube, int (&tile)[3]) const {
   for (int a = 0; a < 3; ++a) tile[a] = static_cast<int>((cube.low[a] - box_.low[a]) / tile_edge_);
+}
+
+void SolidFill::position_in_tile(const LatticeCube& cube, int (&block)[3]) const {
+  for (int a = 0; a < 3; ++a)
+    block[a] = static_cast<int>((cube.low[a] - tile_.low[a]) >> rows_.pitch_log2);
 }
 
 }  // namespace voxdag::cpu

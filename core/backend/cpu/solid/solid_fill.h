@@ -34,20 +34,29 @@ class SolidFill {
   void pass_plane(const PlaneViews::Sides& sides, uint64_t filled);
 
   // For each tile without a call of pass_plane(), in octree order, call begin_tile(), then add()
-  // for each triangle, and then fill_tile().
+  // for each triangle, and then finish_views(). After that, the functions read_part_plane(), fill()
+  // and empty_cube() may be called for cubes within the tile.
   void begin_tile(const LatticeCube& tile);
   void add(const FixedTriangle& triangle) { views_.add(triangle); }
-  // Fills the units (solid_rule.h) of the tile that are inside the solid. Leaves the blocks of
-  // full_blocks() empty; TileReducer treats them as full. Returns false, and fills nothing, if the
-  // tile has no voxel of the shell.
-  bool fill_tile(TileBricks& bricks, int size_log2,
-                 const TileFiller::ForEachTriangle& for_each_triangle);
-  // Returns a bit set of the tile's full voxel blocks, for TileReducer::reduce_bricks().
+  void finish_views();
+  // For the tile or a cube within it, with a single triangle, which covers the cube: returns the
+  // inner sides of the triangle's plane, or nullopt if the cube needs fill(). `f`: the plane's
+  // offset from the cube. If the cube's node can be made with these sides, call pass_part() with
+  // the number of filled voxels.
+  std::optional<PlaneViews::Sides> read_part_plane(const Plane& plane, int64_t f,
+                                                   const LatticeCube& cube) const;
+  void pass_part(const PlaneViews::Sides& sides, uint64_t filled);
+  // Fills the units (solid_rule.h) of the tile, or of a cube within it, that are inside the solid.
+  // `bricks` has the voxels of the cube. Leaves the blocks of full_blocks() empty; TileReducer
+  // treats them as full. Returns false, and fills nothing, if the cube has no voxel of the shell.
+  bool fill(TileBricks& bricks, int size_log2, const LatticeCube& cube,
+            const TileFiller::ForEachTriangle& for_each_triangle);
+  // Returns a bit set of the full voxel blocks after fill(), for TileReducer::reduce_bricks().
   const uint64_t* full_blocks() const { return filler_.full_blocks(); }
 
-  // Returns the views from the corners of a cube that has no voxels of the shell and is at least as
-  // large as a tile. In octree order, the tiles before the cube and in the cube must be finished,
-  // and later tiles must not have begun.
+  // Returns the views from the corners of a cube that has no voxels of the shell. In octree order,
+  // the tiles before the cube and in the cube must be finished, and later tiles must not have
+  // begun. A cube smaller than a tile must be in the current tile.
   UnitViews empty_cube(const LatticeCube& cube);
   // Returns the node of an empty cube that is a unit with the given views: the node of a full cube
   // if the unit is inside the solid, otherwise no node.
@@ -56,7 +65,10 @@ class SolidFill {
   const FilledVoxels& filled() const { return filled_; }
 
  private:
+  // Sets `tile` to the position of a cube in the subvolume, in tiles.
   void position_of(const LatticeCube& cube, int (&tile)[3]) const;
+  // Sets `block` to the position of a cube in the current tile, in blocks.
+  void position_in_tile(const LatticeCube& cube, int (&block)[3]) const;
 
   const SolidRule rule_;
   SubDagTables& tables_;

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "core/backend/cpu/raster/flood.h"
+#include "core/base/popcount8.h"
 #include "core/dag/brick.h"
 #include "core/geometry/crossing.h"
 #include "core/geometry/cube.h"
@@ -39,8 +40,8 @@ int64_t walk_crossings(const FixedTriangle& t, const int64_t (&from)[3], const i
 }  // namespace
 
 bool TileFiller::fill(TileBricks& tile, int size_log2, const int64_t (&low)[3],
-                      const TileViews& views, const ForEachTriangle& for_each_triangle,
-                      FilledVoxels& filled) {
+                      const TileViews& views, const int (&origin)[3],
+                      const ForEachTriangle& for_each_triangle, FilledVoxels& filled) {
   std::fill(std::begin(full_), std::end(full_), 0);
   list_occupied(tile, size_log2);
   const int top = size_log2 - block_log2_;
@@ -48,12 +49,11 @@ bool TileFiller::fill(TileBricks& tile, int size_log2, const int64_t (&low)[3],
   tile_ = &tile;
   tile_low_ = low;
   views_ = &views;
+  origin_ = origin;
   for_each_triangle_ = &for_each_triangle;
   filled_ = &filled;
   for (int level = top; level > 0; --level) fill_empty_children(level);
-  for (int w = 0; w < kTileBlocks / 64; ++w)
-    for (uint64_t rest = occupied_[0][w]; rest != 0; rest &= rest - 1)
-      fill_block(64 * w + lowest_bit(rest));
+  fill_blocks();
   fill_blind();
   return true;
 }
@@ -92,7 +92,7 @@ void TileFiller::fill_empty_children(int level) {
 // `level` log2 of its edge in blocks.
 void TileFiller::fill_empty(int level, int index) {
   int low[3];
-  for (int a = 0; a < 3; ++a) low[a] = cube_coordinate(index, a) << level;
+  for (int a = 0; a < 3; ++a) low[a] = origin_[a] + (cube_coordinate(index, a) << level);
   const UnitViews unit = views_->corners_of(low, 1 << level);
   if (!unit.is_inside()) return;
   const int count = 1 << 3 * level;
@@ -103,26 +103,104 @@ void TileFiller::fill_empty(int level, int index) {
   filled_->add(unit, static_cast<uint64_t>(count) << 3 * block_log2_);
 }
 
+void TileFiller::fill_blocks() {
+  const auto for_each_block = [&](const auto& visit) {
+    for (int w = 0; w < kTileBlocks / 64; ++w)
+      for (uint64_t rest = occupied_[0][w]; rest != 0; rest &= rest - 1)
+        visit(64 * w + lowest_bit(rest));
+  };
+  int count = 0;
+  for (const uint64_t word : occupied_[0]) count += popcount64(word);
+  if (block_log2_ != kBlockLog2 || !memo_.is_worthwhile(count)) {
+    for_each_block([&](int index) { fill_block(index); });
+    return;
+  }
+  count = 0;
+  for_each_block([&](int index) {
+    keys_[count] = block_key(tile_->blocks[index]);
+    memo_.prefetch(keys_[count++]);
+  });
+  count = 0;
+  for_each_block([&](int index) { fill_block(index, keys_[count++]); });
+}
+
 void TileFiller::fill_block(int index) {
-  VoxelBlock& block = tile_->blocks[index];
-  const int low[3] = {cube_coordinate(index, 0), cube_coordinate(index, 1),
-                      cube_coordinate(index, 2)};
+  const VoxelBlock& block = tile_->blocks[index];
+  int low[3];
+  position_of(index, low);
   int32_t classes[8];
   views_->classes_at(low, classes);
   if (block_log2_ == kBlockLog2)
     kernels_.find_components(block, classes, components_);
   else
     find_components_with<kBrickEdge - 1>(block, classes, components_);
+  fill_components(index, low);
+}
+
+void TileFiller::fill_block(int index, uint64_t key) {
+  VoxelBlock& block = tile_->blocks[index];
+  int low[3];
+  position_of(index, low);
+  if (const UnitsMemo::Units* units = memo_.find(key, block)) {
+    fill_units(*units, low, block);
+    return;
+  }
+  memo_.count_miss();
+  // No corners are of the same class, so each component becomes a separate entry.
+  constexpr int32_t kClasses[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  kernels_.find_components(block, kClasses, components_);
+  insert_units(key, block);
+  fill_components(index, low);
+}
+
+void TileFiller::fill_components(int index, const int (&low)[3]) {
   for (int i = 0; i < components_.count; ++i) {
     uint32_t corners = components_.corners[i];
     UnitViews unit;
     if (components_.is_alike[i])
-      unit.add(classes[lowest_bit(corners)]);
+      unit.add(view_at(low, lowest_bit(corners)));
     else
       for (; corners != 0; corners &= corners - 1) unit.add(view_at(low, lowest_bit(corners)));
-    if (unit.is_inside()) filled_->add(unit, kernels_.add_slices(components_.voxels[i], block));
+    if (unit.is_inside())
+      filled_->add(unit, kernels_.add_slices(components_.voxels[i], tile_->blocks[index]));
   }
   if (components_.rest.any()) add_blind(index, low, components_.rest);
+}
+
+void TileFiller::fill_units(const UnitsMemo::Units& units, const int (&low)[3], VoxelBlock& block) {
+  int32_t views[8];
+  views_->at_corners(low, views);
+  bool is_inside[2];
+  for (int u = 0; u < 2; ++u) {
+    UnitViews unit{0, popcount8(units.corners[u])};
+    for (int c = 0; c < 8; ++c) unit.sum += views[c] & -(units.corners[u] >> c & 1);
+    is_inside[u] = unit.is_inside();
+    if (is_inside[u]) filled_->add(unit, units.voxels[u]);
+  }
+  if (!is_inside[0] && !is_inside[1]) return;
+  const uint64_t all = is_inside[0] && is_inside[1] ? ~uint64_t{0} : 0;
+  const uint64_t flipped = is_inside[0] ? 0 : ~uint64_t{0};
+  for (int i = 0; i < kBlockBricks; ++i) block.bricks[i] |= (units.first.bricks[i] ^ flipped) | all;
+}
+
+void TileFiller::insert_units(uint64_t key, const VoxelBlock& block) {
+  const int count = components_.count;
+  if (count == 0 || count > 2 || components_.rest.any()) return;
+  UnitsMemo::Units units{};
+  int voxels = kBlockBricks * 64;
+  for (const uint64_t brick : block.bricks) voxels -= popcount64(brick);
+  if (count == 2) {
+    units.voxels[0] =
+        static_cast<uint16_t>(kernels_.add_slices(components_.voxels[0], units.first));
+    units.corners[0] = static_cast<uint8_t>(components_.corners[0]);
+  }
+  units.voxels[1] = static_cast<uint16_t>(voxels - units.voxels[0]);
+  units.corners[1] = static_cast<uint8_t>(components_.corners[count - 1]);
+  memo_.insert(key, block, units);
+}
+
+void TileFiller::position_of(int index, int (&low)[3]) const {
+  for (int a = 0; a < 3; ++a) low[a] = origin_[a] + cube_coordinate(index, a);
 }
 
 int32_t TileFiller::view_at(const int (&block)[3], int corner) const {
@@ -146,10 +224,10 @@ void TileFiller::add_blind(int index, const int (&low)[3], Slices& rest) {
     kernels_.flood(rest, blind.voxels);
     rest.remove(blind.voxels);
     for (int a = 0; a < 3; ++a) {
-      blind.from[a] = tile_low_[a] + (int64_t{low[a]} << (kUnitBits + block_log2_));
+      blind.from[a] = tile_low_[a] + (int64_t{low[a] - origin_[a]} << (kUnitBits + block_log2_));
       blind.to[a] = blind.from[a] + k[a] * kUnitsPerVoxel + kUnitsPerVoxel / 2;
     }
-    blind.views = views_->at(low[0], low[1], low[2]);
+    blind.views = view_at(low, 0);
     blind.crossings = 0;
     if (blind_.size() == kMaxBlind) fill_blind();
     blind_.push_back(blind);

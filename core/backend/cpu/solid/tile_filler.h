@@ -12,6 +12,7 @@
 #include "core/backend/cpu/raster/slices.h"
 #include "core/backend/cpu/raster/tile_bricks.h"
 #include "core/backend/cpu/solid/tile_views.h"
+#include "core/backend/cpu/solid/units_memo.h"
 #include "core/geometry/fixed_triangle.h"
 
 namespace voxdag::cpu {
@@ -32,14 +33,15 @@ class TileFiller {
   // A function that calls its argument for each triangle of the tile.
   using ForEachTriangle = std::function<void(const std::function<void(const FixedTriangle&)>&)>;
 
-  TileFiller(const Kernels& kernels, SolidRule rule, uint32_t grid_levels)
-      : kernels_(kernels), rule_(rule), block_log2_(solid_block_log2(grid_levels)) {}
+  TileFiller(const Kernels& kernels, SolidRule rule, uint32_t grid_levels, PooledMemory& memory)
+      : kernels_(kernels), rule_(rule), block_log2_(solid_block_log2(grid_levels)), memo_(memory) {}
 
-  // Fills a tile with an edge of 2^size_log2 voxels, whose low corner in lattice units is `low`.
-  // Returns false, without filling, if the tile has no voxel of the shell. Leaves the blocks of
-  // full_blocks() empty.
+  // Fills a tile, or a cube within a tile, with an edge of 2^size_log2 voxels. `low` is its low
+  // corner in lattice units, and `origin` its position in `views`, in blocks. Returns false,
+  // without filling, if the cube has no voxel of the shell. Leaves the blocks of full_blocks()
+  // empty.
   bool fill(TileBricks& tile, int size_log2, const int64_t (&low)[3], const TileViews& views,
-            const ForEachTriangle& for_each_triangle, FilledVoxels& filled);
+            const int (&origin)[3], const ForEachTriangle& for_each_triangle, FilledVoxels& filled);
   // Returns the blocks of the empty cubes that are inside the solid, as a bit set in Morton order.
   const uint64_t* full_blocks() const { return full_; }
 
@@ -59,7 +61,18 @@ class TileFiller {
   // Finds the empty children of the occupied cubes of a level, and fills those inside the solid.
   void fill_empty_children(int level);
   void fill_empty(int level, int index);
+  void fill_blocks();
   void fill_block(int index);
+  // fill_block() with the memo. `key`: block_key() of the block.
+  void fill_block(int index, uint64_t key);
+  // Fills the units in components_, which are the units of a block that is not in the memo.
+  void fill_components(int index, const int (&low)[3]);
+  // Fills the units of a block at the position `low` (in blocks) that are inside the solid.
+  void fill_units(const UnitsMemo::Units& units, const int (&low)[3], VoxelBlock& block);
+  // Adds the block and its units, which are in components_, to the memo if the memo accepts them.
+  void insert_units(uint64_t key, const VoxelBlock& block);
+  // Sets `low` to the position of a block in views_, in blocks.
+  void position_of(int index, int (&low)[3]) const;
   // Returns the sum of the views from a corner of the block at the position `block` (in blocks).
   int32_t view_at(const int (&block)[3], int corner) const;
   // Adds to blind_ the components of `rest`, a set of empty voxels of the block with the number
@@ -76,10 +89,13 @@ class TileFiller {
   uint64_t full_[kTileBlocks / 64];
   std::vector<BlindComponent> blind_;
   BlockComponents components_;
+  UnitsMemo memo_;
+  uint64_t keys_[kTileBlocks];  // of the blocks with voxels, in Morton order
   // Arguments of fill().
   TileBricks* tile_ = nullptr;
   const int64_t* tile_low_ = nullptr;
   const TileViews* views_ = nullptr;
+  const int* origin_ = nullptr;
   const ForEachTriangle* for_each_triangle_ = nullptr;
   FilledVoxels* filled_ = nullptr;
 };

@@ -6,16 +6,6 @@
 
 namespace voxdag::cpu {
 
-namespace {
-
-int32_t class_of(int32_t views) {
-  const int32_t disputed = views < 0 ? -4 : 4;
-  const int32_t inside = views > -6 && views < 6 ? disputed : views;
-  return views >= -3 && views <= 3 ? 0 : inside;
-}
-
-}  // namespace
-
 void TileViews::begin(const SampleRows& rows) { rows_ = rows; }
 
 void TileViews::add(const FixedTriangle& triangle) {
@@ -43,9 +33,6 @@ void TileViews::finish(SolidRule rule, RunningRows& running, const int (&tile)[3
     if (has_crossings_[a]) std::memset(crossings_[a], 0, sizeof crossings_[a]);
     has_crossings_[a] = false;
   }
-  const int32_t* views = &views_[0][0][0];
-  int32_t* classes = &classes_[0][0][0];
-  for (int i = 0; i < kCorners * kCorners * kCorners; ++i) classes[i] = class_of(views[i]);
 }
 
 void TileViews::add_views(int axis, int k, const int32_t* rows) {

@@ -27,13 +27,23 @@ class TileViews {
   // corner depends on the sum of its three views: 0 if the sum means outside, 4 or -4 if it means
   // inside and disputed, and otherwise the sum itself.
   void classes_at(const int (&low)[3], int32_t (&classes)[8]) const {
+    at_corners(low, classes);
+    for (int32_t& views : classes) views = class_of(views);
+  }
+  // Sets `views` to at() of the eight corners of a block, in the order of child indices.
+  void at_corners(const int (&low)[3], int32_t (&views)[8]) const {
     for (int c = 0; c < 8; ++c)
-      classes[c] = classes_[low[0] + (c >> 2)][low[1] + (c >> 1 & 1)][low[2] + (c & 1)];
+      views[c] = at(low[0] + (c >> 2), low[1] + (c >> 1 & 1), low[2] + (c & 1));
   }
   // Returns the views from the corners of a cube; `low` and `edge` are in blocks.
   UnitViews corners_of(const int (&low)[3], int edge) const;
 
  private:
+  static int32_t class_of(int32_t views) {
+    const int32_t disputed = views < 0 ? -4 : 4;
+    const int32_t inside = views > -6 && views < 6 ? disputed : views;
+    return views >= -3 && views <= 3 ? 0 : inside;
+  }
   // Adds the views along an axis, which are in `rows`, to the sums of the corners that are at
   // position k along this axis.
   void add_views(int axis, int k, const int32_t* rows);
@@ -44,7 +54,6 @@ class TileViews {
   // and k + 1.
   int32_t crossings_[3][8][RunningRows::kSquare] = {};
   int32_t views_[kCorners][kCorners][kCorners];
-  int32_t classes_[kCorners][kCorners][kCorners];
 };
 
 }  // namespace voxdag::cpu
