@@ -44,10 +44,10 @@ TEST_F(AppearingOutput, IsKept) {
     return std::vector<std::string>{"build", "s.glb",     "-r", "2048",        "-o",
                                     output,  "--threads", "1",  "--subvolume", "256"};
   };
-  expect_kept("b", "b.work/job.db", build("b"));
+  expect_kept("b", "b.work/lock", build("b"));
   EXPECT_EQ(run(build("b")).status, 0);  // resumes
-  expect_kept("c.partial", "c.work/job.db", build("c"));
-  expect_kept("d.report.json", "d.work/job.db", build("d"));
+  expect_kept("c.partial", "c.work/lock", build("c"));
+  expect_kept("d.report.json", "d.work/lock", build("d"));
   expect_kept("x", "x.lock", {"extract", "s.vdag", "-o", "x", "--threads", "1"});
   expect_kept("e", "e.partial", {"export", "s.vdag", "--to", "ply", "-o", "e"});
   expect_kept("g", "g.partial", {"generate", "soup", "g", "--triangles", "5000000"});

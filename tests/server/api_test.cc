@@ -309,7 +309,7 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   put_scene("m.glb", scene_bytes());
   const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 16384}});
   const std::string work = config_.data_folder + "/jobs/" + id + "/work";
-  ASSERT_TRUE(until([&] { return std::filesystem::exists(work + "/job.db"); }));
+  ASSERT_TRUE(until([&] { return std::filesystem::exists(work + "/lock"); }));
   post("/api/v1/jobs/" + id + "/suspend");
   // The job's process may still write files, so the test waits until the process has ended.
   ASSERT_TRUE(until([&] {
