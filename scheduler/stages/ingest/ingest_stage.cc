@@ -70,20 +70,13 @@ int planned_gpus(const BuildSpec& spec, double total_weight) {
   return gpus_to_use(spec.run, spec.geometry.rule(), total_weight);
 }
 
-// True if the CPU backend in this process certainly builds the subvolumes, with the memory in
-// `run`. The tasks of a cluster can have less memory.
-bool builds_on_this_cpu(const BuildSpec& spec, double total_weight) {
-  const RunOptions& run = spec.run;
-  return !run.cluster && run.backend != BackendName::kParallelHost &&
-         planned_gpus(spec, total_weight) == 0;
-}
-
-// Returns the maximum weight of flat subvolumes. With this maximum, there are enough subvolumes for
-// all threads, and the tables of a subvolume fit in half of a worker's share. Returns 0 if flat
-// subvolumes have no separate maximum.
+// Returns the maximum weight of flat subvolumes that no GPU builds. With this maximum, there are
+// enough subvolumes for all threads, and the tables of a subvolume fit in half of a worker's share.
+// Returns 0 if flat subvolumes have no separate maximum.
 double max_flat_weight(const BuildSpec& spec, double total_weight) {
-  if (!builds_on_this_cpu(spec, total_weight)) return 0;
   const RunOptions& run = spec.run;
+  // The tasks of a cluster can have less memory, and `parallel-host` needs more.
+  if (run.cluster || run.backend == BackendName::kParallelHost) return 0;
   const double subvolumes = std::max(kMinSubvolumes, kMinSubvolumesPerThread * run.threads);
   const WorkerMemory memory = WorkerMemory::divide(run.memory_bytes / 2, run.threads);
   return std::min({kMaxBricksPerFlatSubvolume, total_weight / subvolumes,
