@@ -40,6 +40,7 @@ class MemoryFiles : public voxdag::FileSystem {
   std::unique_ptr<voxdag::ReadableFile> open_own(const std::string&) override { unexpected(); }
   std::unique_ptr<voxdag::WritableFile> open_write(const std::string&) override { unexpected(); }
   void make_directories(const std::string&) override { unexpected(); }
+  void make_directory(const std::string&) override { unexpected(); }
   void remove_directory(const std::string&) override { unexpected(); }
   std::vector<voxdag::DirectoryEntry> list(const std::string&) override { unexpected(); }
   void touch(const std::string&) override { unexpected(); }
