@@ -29,6 +29,7 @@ class RowFile {
   // Both functions throw Error{kCorrupt} if the bytes are damaged.
   std::vector<std::byte> read(const RowExtent& extent) const;
   void read_rows(const RowExtent& extent, std::span<int32_t> out) const;
+  const std::string& path() const { return path_; }
   WritableFile& file() { return *file_; }
   uint64_t end() const;
 

@@ -90,12 +90,6 @@ class FaceEncoder {
                                    // the root that contains it
 };
 
-[[noreturn]] void refuse_face() {
-  throw Error(ErrorCode::kCorrupt,
-              "the stored labels of the empty space at a face of a subvolume are damaged: expected "
-              "a complete quadtree of labels");
-}
-
 }  // namespace
 
 std::vector<std::byte> encode_face(const SpaceLabels& labels, int face, uint64_t max_bytes) {
@@ -108,8 +102,16 @@ std::vector<std::byte> empty_face() {
   return {static_cast<std::byte>(FaceReader::Kind::kEmpty), std::byte{0}};
 }
 
+void FaceReader::refuse() const {
+  throw Error(ErrorCode::kCorrupt,
+              path_ +
+                  ": the labels of the empty space at a face of a subvolume are damaged at byte " +
+                  std::to_string(at_) + " of " + std::to_string(bytes_.size()) +
+                  ": expected a complete quadtree of labels");
+}
+
 uint8_t FaceReader::byte() {
-  if (at_ >= bytes_.size()) refuse_face();
+  if (at_ >= bytes_.size()) refuse();
   return static_cast<uint8_t>(bytes_[at_++]);
 }
 
@@ -120,12 +122,12 @@ uint32_t FaceReader::label() {
     label |= static_cast<uint32_t>(next & 0x7f) << shift;
     if (next < 0x80) return label;
   }
-  refuse_face();
+  refuse();
 }
 
 FaceReader::Square FaceReader::next() {
   const uint8_t kind = byte();
-  if (kind > static_cast<uint8_t>(Kind::kBrick)) refuse_face();
+  if (kind > static_cast<uint8_t>(Kind::kBrick)) refuse();
   Square out{static_cast<Kind>(kind), {}};
   if (out.kind == Kind::kEmpty) out.pieces.push_back({label(), 0xffff});
   if (out.kind == Kind::kBrick)
@@ -142,8 +144,8 @@ void FaceReader::skip(const Square& square) {
     if (next().kind == Kind::kSplit) left += 4;
 }
 
-void FaceReader::check_depth(int depth) {
-  if (depth > kMaxFaceDepth) refuse_face();
+void FaceReader::check_depth(int depth) const {
+  if (depth > kMaxFaceDepth) refuse();
 }
 
 FaceReader::Square FaceReader::descend(std::span<const uint8_t> path) {

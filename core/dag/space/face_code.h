@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/dag/space/space_labels.h"
@@ -26,7 +27,7 @@ std::vector<std::byte> encode_face(const SpaceLabels& labels, int face, uint64_t
 // Returns the quadtree of a face of an empty cube. The label of the cube's only component is 0.
 std::vector<std::byte> empty_face();
 
-// Reads a quadtree. Throws Error{kCorrupt} if the bytes are not a quadtree.
+// Reads a quadtree. Throws Error{kCorrupt}, which names the file, if the bytes are not a quadtree.
 class FaceReader {
  public:
   enum class Kind : uint8_t { kSet, kSplit, kEmpty, kBrick };
@@ -40,7 +41,9 @@ class FaceReader {
     std::vector<Piece> pieces;  // kEmpty: one; kBrick: the components at the face
   };
 
-  explicit FaceReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  // `path` is the file that contains the bytes. `path` and `bytes` must outlive the reader.
+  FaceReader(const std::string& path, std::span<const std::byte> bytes)
+      : path_(path), bytes_(bytes) {}
 
   // Reads the next square. If its kind is kSplit, its quadrants follow.
   Square next();
@@ -50,12 +53,14 @@ class FaceReader {
   // returns the larger square.
   Square descend(std::span<const uint8_t> path);
   // Throws Error{kCorrupt} if no face of a grid has a quadtree of this depth.
-  static void check_depth(int depth);
+  void check_depth(int depth) const;
+  [[noreturn]] void refuse() const;
 
  private:
   uint8_t byte();
   uint32_t label();
 
+  const std::string& path_;
   std::span<const std::byte> bytes_;
   size_t at_ = 0;
 };
@@ -67,7 +72,7 @@ template <class Unite>
 void join_squares(FaceReader& a, const FaceReader::Square& in_a, FaceReader& b,
                   const FaceReader::Square& in_b, const Unite& unite, int depth = 0) {
   using Kind = FaceReader::Kind;
-  FaceReader::check_depth(depth);
+  a.check_depth(depth);
   if (in_a.kind == Kind::kSet || in_b.kind == Kind::kSet) {
     a.skip(in_a);
     b.skip(in_b);

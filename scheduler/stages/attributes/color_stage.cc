@@ -80,10 +80,11 @@ struct BakeWorker {
   bool is_baked = false;       // baked in this run; otherwise its records are in the ColorStore
 };
 
-// Adds the regions in `records` to a section. Returns the number of their cells on the finest
-// level.
-uint64_t add_regions(std::span<const std::byte> records, AttributeSectionWriter& section) {
-  RegionRecords regions(records);
+// Adds the regions in `records`, an artifact or a part of one, to a section. Returns the number of
+// their cells on the finest level.
+uint64_t add_regions(const ColorStore& artifacts, std::span<const std::byte> records,
+                     AttributeSectionWriter& section) {
+  RegionRecords regions(artifacts.path(), records);
   uint64_t cells = 0;
   while (const auto region = regions.next()) {
     section.add_region(*region);
@@ -293,9 +294,9 @@ void ColorStage::State::bake(ColorStore& artifacts, TextureSet& textures, Global
         if (worker.is_baked) stored = stored.first(stored.size() - 1);
         for (const ColorStore::Place& place : stored) {
           artifacts.read(place, part);
-          report.cells += add_regions(part, section);
+          report.cells += add_regions(artifacts, part, section);
         }
-        report.cells += add_regions(worker.records[0], section);
+        report.cells += add_regions(artifacts, worker.records[0], section);
         if (worker.is_baked) build.progress.advance(1);
       });
   build.progress.end_stage();
@@ -318,7 +319,7 @@ void ColorStage::State::add_stored(const ColorStore& artifacts, size_t attribute
     for (const ColorStore::Place& place : parts[attribute][item]) {
       build.cancel.check();
       artifacts.read(place, part);
-      add_regions(part, section);
+      add_regions(artifacts, part, section);
     }
     build.progress.advance(1);
   }

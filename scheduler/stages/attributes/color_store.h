@@ -55,6 +55,7 @@ class ColorStore {
   // plus 64 KiB. Does not remove them if the disk has no space for a copy of the file. Call it
   // before add(). An interruption leaves the old or the new file, both complete.
   void keep_only(std::span<const Checksum128> keys, const CancelToken& cancel);
+  const std::string& path() const { return path_; }
   // Bytes of the file.
   uint64_t file_bytes() const;
 

@@ -38,8 +38,9 @@ std::optional<EncodedRegion> RegionRecords::next() {
   const auto prefix = in_.take(prefixes * sizeof(uint32_t));
   if (!in_.ok())
     throw Error(ErrorCode::kCorrupt,
-                "record " + std::to_string(count_) +
-                    " of the stored attributes is cut off: expected a complete region");
+                path_ + ": record " + std::to_string(count_) +
+                    " of the stored attributes is cut off: expected a complete region; start over "
+                    "with --restart");
   ++count_;
   region.blocks.assign(blocks.begin(), blocks.end());
   region.prefix.resize(prefixes);

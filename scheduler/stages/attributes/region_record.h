@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/color/blocks/region.h"
@@ -20,12 +21,15 @@ void append_region(const EncodedRegion& region, std::vector<std::byte>& out);
 // the checksum of the bytes.
 class RegionRecords {
  public:
-  explicit RegionRecords(std::span<const std::byte> bytes) : in_(bytes) {}
-  // Returns the next region; nullopt after the last one. Throws Error{kCorrupt} if the bytes end
-  // within a record.
+  // `path` is the file that contains the records. `path` and `bytes` must outlive the reader.
+  RegionRecords(const std::string& path, std::span<const std::byte> bytes)
+      : path_(path), in_(bytes) {}
+  // Returns the next region; nullopt after the last one. Throws Error{kCorrupt}, which names
+  // the file, if the bytes end within a record.
   std::optional<EncodedRegion> next();
 
  private:
+  const std::string& path_;
   ByteSource in_;
   uint64_t count_ = 0;
 };

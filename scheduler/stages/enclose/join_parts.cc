@@ -190,7 +190,7 @@ class PartJoiner {
     cancel_.check();
     read(a.ref.index, 2 * axis + 1, low_);
     read(b.ref.index, 2 * axis, high_);
-    FaceReader in_a(low_.bytes), in_b(high_.bytes);
+    FaceReader in_a(faces_.path(), low_.bytes), in_b(faces_.path(), high_.bytes);
     const auto square_a = in_a.descend(a.path), square_b = in_b.descend(b.path);
     const uint32_t first_a = first_[a.ref.index], first_b = first_[b.ref.index];
     join_squares(in_a, square_a, in_b, square_b, [&](uint32_t label_a, uint32_t label_b) {
@@ -202,12 +202,14 @@ class PartJoiner {
 
   void check_label(uint32_t leaf, uint32_t label) const {
     const uint32_t part = tree_.leaves()[leaf].part;
-    if (label < (part == PartTree::kEmpty ? 1 : parts_[part].touch.size())) return;
-    throw Error(
-        ErrorCode::kCorrupt,
-        "the stored labels of the empty space at a face of a subvolume are damaged: label " +
-            std::to_string(label) +
-            " is not the number of a component of the subvolume, expected one");
+    const size_t components = part == PartTree::kEmpty ? 1 : parts_[part].touch.size();
+    if (label < components) return;
+    throw Error(ErrorCode::kCorrupt,
+                faces_.path() +
+                    ": the labels of the empty space at a face of a subvolume are damaged: label " +
+                    std::to_string(label) +
+                    " is not the number of a component, expected less than " +
+                    std::to_string(components) + "; start over with --restart");
   }
 
   // The face quadtree that was read last. It is kept because a large cube has many small neighbors

@@ -9,14 +9,14 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr uint64_t kMinSlots = 64;
+constexpr uint64_t kMinBlockSlots = 64;
 constexpr uint64_t kFirstSlots = 4096;
-constexpr uint64_t kMaxSlots = uint64_t{1} << 16;  // 5 MiB; more would exceed the CPU caches
+constexpr uint64_t kMaxBlockSlots = uint64_t{1} << 16;  // 5 MiB; more would exceed the CPU caches
 
 }  // namespace
 
 BlockMemo::BlockMemo(PooledMemory& memory) : memory_(memory) {
-  set_slots(fits_budget(kFirstSlots) ? kFirstSlots : kMinSlots);
+  set_slots(fits_budget(kFirstSlots) ? kFirstSlots : kMinBlockSlots);
 }
 
 bool BlockMemo::fits_budget(uint64_t slots) const {
@@ -34,7 +34,7 @@ void BlockMemo::set_slots(uint64_t slots) {
 void BlockMemo::grow() {
   inserted_ = 0;
   const uint64_t old_slots = slots_, slots = 4 * slots_;
-  if (slots > kMaxSlots || !fits_budget(slots)) return;
+  if (slots > kMaxBlockSlots || !fits_budget(slots)) return;
   const PooledArray<VoxelBlock> blocks = std::move(blocks_);
   const PooledArray<Node> nodes = std::move(nodes_);
   set_slots(slots);

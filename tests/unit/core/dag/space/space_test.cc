@@ -18,6 +18,8 @@
 namespace voxdag {
 namespace {
 
+const std::string kFaceFile = "faces";  // the file that errors of FaceReader name
+
 TEST(Space, NeighborsInABrick) {
   for (int bit = 0; bit < 64; ++bit) {
     uint64_t expected = 0;
@@ -153,7 +155,7 @@ void expect_joined(const SpaceGrid& grid, int axis, int edge) {
   for (uint32_t i = 0; i < set.size(); ++i) set[i] = i;
   const auto low_face = encode_face(parts[0].labels(), 2 * axis + 1, UINT64_MAX);
   const auto high_face = encode_face(parts[1].labels(), 2 * axis, UINT64_MAX);
-  FaceReader a(low_face), b(high_face);
+  FaceReader a(kFaceFile, low_face), b(kFaceFile, high_face);
   const auto square_a = a.next(), square_b = b.next();
   join_squares(a, square_a, b, square_b, [&](uint32_t i, uint32_t j) {
     const uint32_t from = set[i], to = set[first[1] + j];
@@ -208,7 +210,7 @@ TEST(Space, FacesDescend) {
   SpaceDag dag(grid);
   const auto bytes = encode_face(dag.labels(), 1, UINT64_MAX);
   const uint8_t to_brick[] = {1, 1}, to_empty[] = {2, 1};
-  FaceReader brick(bytes), empty(bytes);
+  FaceReader brick(kFaceFile, bytes), empty(kFaceFile, bytes);
   EXPECT_EQ(brick.descend(to_brick).kind, FaceReader::Kind::kBrick);
   EXPECT_EQ(empty.descend(to_empty).kind, FaceReader::Kind::kEmpty);
   EXPECT_EQ(empty_face().size(), 2u);
@@ -222,16 +224,17 @@ TEST(Space, FacesOfAnyDepthAreRefused) {
     try {
       read();
     } catch (const Error& e) {
+      EXPECT_TRUE(std::string(e.what()).starts_with(kFaceFile)) << e.what();
       return e.code();
     }
     return std::nullopt;
   };
   EXPECT_EQ(ErrorCode::kCorrupt, code_of([&] {
-              FaceReader reader(split);
+              FaceReader reader(kFaceFile, split);
               reader.skip(reader.next());
             }));
   EXPECT_EQ(ErrorCode::kCorrupt, code_of([&] {
-              FaceReader a(split), b(split);
+              FaceReader a(kFaceFile, split), b(kFaceFile, split);
               const auto square_a = a.next(), square_b = b.next();
               join_squares(a, square_a, b, square_b, [](uint32_t, uint32_t) {});
             }));

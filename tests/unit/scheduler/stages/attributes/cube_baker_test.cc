@@ -14,6 +14,8 @@
 namespace voxdag {
 namespace {
 
+const std::string kRecordsFile = "records";  // the file that errors of RegionRecords name
+
 struct Baked {
   CubeBaker::Records records;
   size_t parts = 0;  // how often full records were taken before the end
@@ -100,7 +102,7 @@ TEST_F(CubeBaking, DividesSurfaces) {
   }
   const Baked whole = bake(ColorMemory::kRegionBytes, uint64_t{64} << 20);
   size_t regions = 0;
-  for (RegionRecords records(whole.records[0]); records.next();) ++regions;
+  for (RegionRecords records(kRecordsFile, whole.records[0]); records.next();) ++regions;
   EXPECT_GT(regions, 100u);
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 60 << 10).records, whole.records);
   // With 1 KiB, even the surfaces of one region do not fit, so each region processes them in
@@ -126,7 +128,7 @@ TEST_F(SolidCubes, AreBakedByChildren) {
     }
   const Baked whole = bake(ColorMemory::kSolidRegionBytes, 1 << 20);
   uint64_t cells = 0;
-  for (RegionRecords records(whole.records[0]); const auto region = records.next();)
+  for (RegionRecords records(kRecordsFile, whole.records[0]); const auto region = records.next();)
     cells += region->counts[0];
   EXPECT_EQ(cells, uint64_t{1} << 21);
   // Records were handed over several times, so that only a few regions are in memory at any time.
