@@ -47,7 +47,7 @@ class NodeIndex {
     return starts & bit ? before + static_cast<uint64_t>(popcount64(starts & (bit - 1))) : kNone;
   }
   // Prefetches the memory that find() reads.
-  void prefetch(uint64_t offset) const {
+  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
     if (pointers_ != Pointers::kNone && offset < level_.word_count)
       __builtin_prefetch(&words_[offset / 64]);
   }
