@@ -6,7 +6,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -16,9 +15,10 @@
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
-#include "core/base/popcount8.h"
 #include "core/format/global/voxdag_reader.h"
 #include "voxdag/cancel_token.h"
+
+#define VOXDAG_INLINE __attribute__((always_inline)) inline
 
 namespace voxdag {
 
@@ -31,6 +31,33 @@ class NodeIndex {
  public:
   static constexpr uint64_t kNone = ~uint64_t{0};
 
+  // Describes 64 words of the level.
+  struct Words {
+    uint64_t starts = 0;  // one bit per word: set if a node begins there
+    uint64_t before = 0;  // number of nodes that begin before the 64 words
+  };
+
+  // The functions of a NodeIndex that loops over many offsets call. They are always inlined, so
+  // that sources that are compiled for different instruction sets can call them. The index must
+  // outlive the Lookup.
+  struct Lookup {
+    const Words* words = nullptr;  // null for bricks
+    uint64_t word_count = 0;
+
+    VOXDAG_INLINE uint64_t find(uint64_t offset) const {
+      if (offset >= word_count) return kNone;
+      if (!words) return offset % 2 == 0 ? offset / 2 : kNone;
+      const Words& found = words[offset / 64];
+      const uint64_t bit = uint64_t{1} << offset % 64;
+      if (!(found.starts & bit)) return kNone;
+      return found.before + static_cast<uint64_t>(__builtin_popcountll(found.starts & (bit - 1)));
+    }
+    // Prefetches the memory that find() reads.
+    VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
+      if (words && offset < word_count) __builtin_prefetch(&words[offset / 64]);
+    }
+  };
+
   NodeIndex() = default;
   // Walks the words of the level on up to `threads` threads. Throws Error{kCorrupt} unless every
   // child mask is 1 to 255, the last node ends with the level, and the level has as many nodes as
@@ -39,18 +66,8 @@ class NodeIndex {
             MemoryBudget& budget, const CancelToken& cancel, const std::string& where);
 
   // Returns the index of the node that begins at `offset`; kNone if no node begins there.
-  uint64_t find(uint64_t offset) const {
-    if (offset >= level_.word_count) return kNone;
-    if (pointers_ == Pointers::kNone) return offset % 2 == 0 ? offset / 2 : kNone;
-    const auto [starts, before] = words_[offset / 64];
-    const uint64_t bit = uint64_t{1} << offset % 64;
-    return starts & bit ? before + static_cast<uint64_t>(popcount64(starts & (bit - 1))) : kNone;
-  }
-  // Prefetches the memory that find() reads.
-  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
-    if (pointers_ != Pointers::kNone && offset < level_.word_count)
-      __builtin_prefetch(&words_[offset / 64]);
-  }
+  uint64_t find(uint64_t offset) const { return lookup().find(offset); }
+  Lookup lookup() const { return {words_.data(), level_.word_count}; }
 
   // To visit all nodes of the level, call visit_span() for the spans 0 to span_count() - 1, on any
   // threads. visit_span() calls visit(index, offset) for the nodes that begin in the span, in
@@ -75,11 +92,6 @@ class NodeIndex {
  private:
   static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
 
-  // Describes 64 words of the level.
-  struct Words {
-    uint64_t starts = 0;  // one bit per word: set if a node begins there
-    uint64_t before = 0;  // number of nodes that begin before the 64 words
-  };
   struct Span {
     uint64_t begin = 0;  // word offset of its first node
     uint64_t end = 0;    // word offset of the end of its last node
@@ -96,47 +108,5 @@ class NodeIndex {
   Pointers pointers_ = Pointers::kNone;
   PageBuffer<Words> words_;
 };
-
-// A node together with the indexes of its children.
-struct NodeWithChildren {
-  uint64_t index = 0;  // index of the node in its level
-  uint64_t at = 0;     // word offset at which the node begins
-  voxdag_reader::Node node;
-  // Indexes of its children in the level below; NodeIndex::kNone if no node begins at a pointer.
-  std::array<uint64_t, 8> children{};
-
-  int child_count() const { return kPopcount8[node.child_mask]; }
-};
-
-// Calls visit(NodeWithChildren) for the nodes of a span of `nodes`, in order. `below` is the index
-// of the next finer level. `node_at(offset)` returns the node at a word offset. `prefetch(index)`
-// prefetches the data that visit() needs about a child, given the child's index. The lookups of
-// children read memory at random places. So nodes are processed in batches: the reads of a batch
-// are prefetched, and their cache misses overlap.
-template <class NodeAt, class Prefetch, class Visit>
-void visit_span_with_children(const NodeIndex& nodes, uint64_t span, const NodeIndex& below,
-                              const NodeAt& node_at, const Prefetch& prefetch, const Visit& visit) {
-  std::array<NodeWithChildren, 64> batch;
-  size_t size = 0;
-  const auto finish_batch = [&] {
-    for (size_t i = 0; i < size; ++i)
-      for (int c = 0; c < batch[i].child_count(); ++c) {
-        const uint64_t child = below.find(batch[i].node.child(c));
-        batch[i].children[static_cast<size_t>(c)] = child;
-        if (child != NodeIndex::kNone) prefetch(child);
-      }
-    for (size_t i = 0; i < size; ++i) visit(batch[i]);
-    size = 0;
-  };
-  nodes.visit_span(span, [&](uint64_t index, uint64_t at) {
-    NodeWithChildren& added = batch[size++];
-    added.index = index;
-    added.at = at;
-    added.node = node_at(at);
-    for (int c = 0; c < added.child_count(); ++c) below.prefetch(added.node.child(c));
-    if (size == batch.size()) finish_batch();
-  });
-  finish_batch();
-}
 
 }  // namespace voxdag

@@ -12,9 +12,10 @@
 //      from the DAG.
 //   6. Colors and other attributes satisfy the rules in verify_colors.h.
 //
-// Needs 2 bits of memory per word of the file, and 9 bytes per node of two consecutive levels,
-// charged to the budget. If the nodes are in the order by first parent, needs another 64 MiB per
-// thread. All threads work on the same level. The result does not depend on the number of threads.
+// Needs memory for two consecutive levels, charged to the budget: 2 bits per word, and 12 bytes per
+// node, or 24 bytes per node of levels whose cubes have more than 32 voxels per edge. If the nodes
+// are in the order by first parent, needs another 64 MiB per thread. All threads work on the same
+// level. The result does not depend on the number of threads.
 #pragma once
 
 #include <cstdint>

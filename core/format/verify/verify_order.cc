@@ -31,7 +31,7 @@ void visit_range(const HashedLevel& nodes, uint64_t range, int bits, const Cance
   for (uint64_t span = 0; span < nodes.index.span_count(); ++span) {
     cancel.check();
     nodes.index.visit_span(span, [&](uint64_t i, uint64_t at) {
-      const uint64_t hash = nodes.hashes[i];
+      const uint64_t hash = nodes.table.hash(i);
       if (bits == 0 || hash >> (64 - bits) == range) visit(hash, at);
     });
   }
@@ -102,12 +102,11 @@ void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const
 
 void expect_unique(const HashedLevel& nodes, unsigned threads, MemoryBudget& budget,
                    const CancelToken& cancel) {
-  const uint64_t ranges =
-      std::bit_ceil((nodes.hashes.size() + kNodesPerRange - 1) / kNodesPerRange);
+  const uint64_t ranges = std::bit_ceil((nodes.table.size() + kNodesPerRange - 1) / kNodesPerRange);
   const int bits = std::countr_zero(ranges);
   std::vector<uint64_t> counts(ranges);
-  for (uint64_t i = 0; i < nodes.hashes.size(); ++i)
-    ++counts[bits == 0 ? 0 : nodes.hashes[i] >> (64 - bits)];
+  for (uint64_t i = 0; i < nodes.table.size(); ++i)
+    ++counts[bits == 0 ? 0 : nodes.table.hash(i) >> (64 - bits)];
   parallel_for(threads, ranges, [&](unsigned, size_t range) {
     expect_unique_range(nodes, range, bits, counts[range], budget, cancel);
   });

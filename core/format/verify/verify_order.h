@@ -6,9 +6,9 @@
 #include <cstdint>
 
 #include "core/base/memory_budget.h"
-#include "core/base/page_buffer.h"
 #include "core/format/global/node_index.h"
 #include "core/format/global/voxdag_reader.h"
+#include "core/format/verify/subtree_table.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag {
@@ -30,12 +30,12 @@ bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, u
 void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
                           const CancelToken& cancel);
 
-// A level and the truncated hashes of its nodes.
+// A level, and a table with the truncated hashes of its nodes.
 struct HashedLevel {
   const voxdag_reader::File& file;
   uint32_t level;
   const NodeIndex& index;
-  const PageBuffer<uint64_t>& hashes;
+  const SubtreeTable& table;
 };
 
 // Checks that no two nodes of the level are equal. Sorts the nodes by their hashes, one range of

@@ -193,6 +193,34 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
                   "octree nodes, the DAG has "}));
 
+// Adds a node to which no node refers to level 1, at its right position in the order. Returns the
+// node's index.
+uint64_t add_lonely_node(oracle::Dag& dag) {
+  std::vector<oracle::Node>& nodes = dag.levels[dag.levels.size() - 2];
+  const std::vector<oracle::Node>& below = dag.levels[dag.levels.size() - 3];
+  oracle::Node lonely;
+  for (uint32_t child = 0; lonely.children.empty(); ++child) {
+    lonely = {oracle::node_hash(1, {below[child].hash}), 1, {child}};
+    if (std::find(nodes.begin(), nodes.end(), lonely) != nodes.end()) lonely.children.clear();
+  }
+  const auto at = std::lower_bound(nodes.begin(), nodes.end(), lonely);
+  const auto index = static_cast<uint32_t>(at - nodes.begin());
+  nodes.insert(at, lonely);
+  for (uint32_t& child : dag.levels.back()[0].children) child += child >= index;
+  return index;
+}
+
+// If several levels have nodes without a parent, the error names the first one of the coarsest
+// level. On this level, the table of `verify` has 64 bits for each value.
+TEST_F(VerifyTest, TheCoarsestNodeWithoutAParentIsNamed) {
+  oracle::Dag dag = oracle::build_dag(random_voxels(7, 128), 64);
+  add_lonely_brick(dag);
+  const uint64_t index = add_lonely_node(dag);
+  write_global(path_, dag, grid_of(128));
+  EXPECT_THAT(error_of([&] { verify(path_); }).message(),
+              HasSubstr("level 1: node " + std::to_string(index) + " has no parent"));
+}
+
 // The error names a child pointer whose word offset is in the middle of a node of the next level,
 // or beyond the end of the next level.
 TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
