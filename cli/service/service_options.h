@@ -28,9 +28,10 @@ class ServiceOptions {
 };
 
 // Adds a client command, as add_command() adds other commands. `State` has a member `service` of
-// the type ServiceOptions. The caller's file must define run(state, client, context). `client` is
-// connected to the server that the options name. Users can shorten the job ids in the members `id`
-// and `ids` of `State`; run() gets the complete ids.
+// the type ServiceOptions. The caller's file must define declare(command, state), as for
+// add_command(), and run(state, client, context). `client` is connected to the server that the
+// options name. Users can shorten the job ids in the members `id` and `ids` of `State`; run() gets
+// the complete ids.
 template <class State>
 State& add_service_command(CommandLine& line, const char* name, const char* description) {
   Command command = line.add(name, description);

@@ -140,8 +140,11 @@ voxdag_status overlaps_of(const voxdag_file* file, uint32_t grid_levels, const S
       expect_pointer(overlaps, "the array of answers");
     }
     const voxdag::query::DagView dag(file->dag.file());
-    for (size_t i = 0; i < count; ++i)
-      overlaps[i] = voxdag::query::overlaps(dag, grid_levels, shape_of(shapes[i]));
+    for (size_t i = 0; i < count; ++i) try {
+        overlaps[i] = voxdag::query::overlaps(dag, grid_levels, shape_of(shapes[i]));
+      } catch (const voxdag::Error& e) {
+        throw voxdag::Error(e.code(), "shape " + std::to_string(i) + ": " + e.message());
+      }
   });
 }
 

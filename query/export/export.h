@@ -52,7 +52,7 @@ struct ExportOptions {
   std::optional<int> band;  // with GridKind::kSdf: half width of the band, in voxels; default 3
   bool compact = false;     // npz: leave out arrays that can be computed from the others
   bool outside = false;     // glb: only faces that are visible from outside
-  bool watertight = false;  // glb: no vertex is inside a side of a rectangle (surface_mesh.h)
+  bool watertight = false;  // glb: a closed mesh without T-junctions (surface_mesh.h)
 };
 
 // The description from which the options of the command line, the service and Python derive.

@@ -195,9 +195,10 @@ void require_hashdag_limits(const ExportJob& job, const SelectedDag& dag) {
     refuse("the top " + std::to_string(top_levels(dag.grid_levels())) + " levels have " +
            count_text(nodes) + " nodes, but HashDAG takes fewer than " + count_text(kMaxCount));
   if (job.has_colors && dag.voxels() > kMaxHashDagColors)
-    refuse(count_text(dag.voxels()) + " voxels are selected, but HashDAG numbers at most " +
-           count_text(kMaxHashDagColors) + " for colors (" + option_text("gray") +
-           " leaves them out)");
+    refuse(count_text(dag.voxels()) +
+           " voxels are selected, but HashDAG can store the colors of at most " +
+           count_text(kMaxHashDagColors) + " voxels (" + option_text("gray") +
+           " leaves the colors out)");
 }
 
 }  // namespace

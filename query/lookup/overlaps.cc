@@ -112,28 +112,31 @@ class OverlapSearch {
   const Shape& shape_;
 };
 
-void expect_finite(const char* shape, const Point& point) {
-  for (const double number : point)
-    if (!std::isfinite(number))
-      throw Error(ErrorCode::kInvalidInput, std::string(shape) + " has the coordinate " +
-                                                std::to_string(number) +
-                                                ": expected finite numbers");
+// `name` is the name of the number in the shape.
+void expect_finite(const std::string& name, double number) {
+  if (!std::isfinite(number))
+    throw Error(ErrorCode::kInvalidInput,
+                name + " is " + std::to_string(number) + ": expected a finite number");
+}
+void expect_finite(const std::string& name, const Point& point) {
+  for (size_t axis = 0; axis < 3; ++axis)
+    expect_finite(name + "[" + std::to_string(axis) + "]", point[axis]);
 }
 
 }  // namespace
 
 bool overlaps(const DagView& dag, uint32_t grid_levels, const OverlapBox& box) {
   check_grid_levels(dag, grid_levels);
-  expect_finite("a box", box.low);
-  expect_finite("a box", box.high);
+  expect_finite("the box's low", box.low);
+  expect_finite("the box's high", box.high);
   return OverlapSearch<OverlapBox>(dag, grid_levels, box).run();
 }
 
 bool overlaps(const DagView& dag, uint32_t grid_levels, const Capsule& capsule) {
   check_grid_levels(dag, grid_levels);
-  expect_finite("a capsule", capsule.from);
-  expect_finite("a capsule", capsule.to);
-  expect_finite("a capsule", {capsule.radius, 0, 0});
+  expect_finite("the capsule's from", capsule.from);
+  expect_finite("the capsule's to", capsule.to);
+  expect_finite("the capsule's radius", capsule.radius);
   return OverlapSearch<Capsule>(dag, grid_levels, capsule).run();
 }
 

@@ -204,8 +204,9 @@ void Dispatcher::start_worker(const std::string& key, std::shared_ptr<LiveJob> l
     std::lock_guard lock(live_mutex_);
     live_.erase(key);
   };
-  const auto run = [this, key, live, forget_live, work = std::move(work)] {
-    const bool ended = steps_.run("run " + key, [&] { work(*live); });
+  const std::string step = (is_job ? "run job " : "run ") + key;
+  const auto run = [this, key, step, live, forget_live, work = std::move(work)] {
+    const bool ended = steps_.run(step, [&] { work(*live); });
     {
       std::lock_guard lock(mutex_);
       workers_.at(key).done = true;

@@ -227,7 +227,7 @@ Exports::Added Exports::add(const std::string& job, const std::string& request,
   if (queued >= kMaxQueuedExports)
     throw RequestError(
         RequestError::Kind::kBusy,
-        "too many exports are queued: expected less than " + std::to_string(kMaxQueuedExports));
+        "too many exports are queued: expected fewer than " + std::to_string(kMaxQueuedExports));
   if (known) {
     it = known->it;
   } else {

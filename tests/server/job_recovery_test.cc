@@ -225,7 +225,7 @@ TEST_F(JobRecovery, AJobThatWaitsForAnotherAttemptIsCanceledToo) {
 // Nevertheless the job stops.
 TEST_F(JobRecovery, AJobThatIsSuspendedAsItsProcessIsMadeDoesNotRunOn) {
   use_program(R"(sleep 1; echo '{"json":"{}","message":"result"}')");
-  hold_step("run ");
+  hold_step("run job ");
   const auto before = std::signal(SIGTERM, [](int) {});  // as `voxdag serve` does
   start();
   const std::string id = posted_job();

@@ -40,8 +40,9 @@ class LevelReader {
       at += 1 + (static_cast<uint64_t>(popcount8(children.mask)) << wide);
     }
   }
-  // Returns an array for the row numbers (in NodeLevels) of a level's nodes or bricks. The index of
-  // a node or brick is half its word offset, because each of them has at least two words.
+  // Returns an array for the row numbers (in NodeLevels) of a level's nodes or bricks. The row
+  // number of the node or brick at word offset `offset` is stored at position offset / 2. Each of
+  // them has at least two words, so no two have the same position.
   PooledArray<uint32_t> row_numbers(uint32_t depth) const {
     return {memory_, dag_.level(depth).words.size() / 2 + 1};
   }

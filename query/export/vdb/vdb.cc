@@ -156,13 +156,13 @@ ChargedVdb charge_vdb(const ExportJob& job, const VoxelGrid& grid, const VdbNode
   if (size.bytes > limit)
     refuse_size(
         job,
-        "the grid would take over " + size_text(limit) + " of memory, the limit " +
-            option_text("memory") +
-            (grid.has_colors(job) ? " (without colors, " + option_text("gray") + ", it takes less)"
+        "the grid would take over " + size_text(limit) + " of memory, which is what " +
+            option_text("memory") + " leaves for it" +
+            (grid.has_colors(job) ? ". Without colors (" + option_text("gray") + ") it takes less"
                                   : "") +
             (grid.name == std::string_view("mask")
                  ? ""
-                 : " (" + option_text("grid", "mask") + " takes less)"),
+                 : ". " + option_text("grid", "mask") + " takes less"),
         [&](uint32_t level) {
           return size_of(coarser(job.selection, level), CancelCheck(job)).bytes <= limit;
         },

@@ -26,6 +26,10 @@ struct Extent {
   uint64_t bytes;
 };
 
+std::string text_of(uint128 bytes) {
+  return bytes > UINT64_MAX ? "2^64" : std::to_string(static_cast<uint64_t>(bytes));
+}
+
 void check_view(const Document& d, const BufferView& view, const std::string& where) {
   check_index(d, d.buffers.size(), view.buffer, where, "buffer");
   d.check_usable("buffers", view.buffer);
@@ -34,8 +38,8 @@ void check_view(const Document& d, const BufferView& view, const std::string& wh
   if (buffer.kind == BufferSource::Kind::kDecoded) check_compressed(d, view, where);
   const uint128 end = static_cast<uint128>(view.byte_offset) + view.byte_length;
   if (end > buffer.byte_length)
-    refuse(d.path,
-           where + " ends past the " + std::to_string(buffer.byte_length) + " bytes of " + name);
+    refuse(d.path, where + ": " + name + " has " + std::to_string(buffer.byte_length) +
+                       " bytes, expected at least " + text_of(end));
   if (buffer.kind == BufferSource::Kind::kNone)
     refuse(
         d.path,
@@ -58,8 +62,8 @@ void check_extent(const Document& d, const Extent& extent, const std::string& wh
   const uint128 end =
       static_cast<uint128>(extent.count - 1) * stride + extent.offset + extent.bytes;
   if (end > view.byte_length)
-    refuse(d.path,
-           where + " ends past the " + std::to_string(view.byte_length) + " bytes of " + name);
+    refuse(d.path, where + ": " + name + " has " + std::to_string(view.byte_length) +
+                       " bytes, expected at least " + text_of(end));
 }
 
 void check_sparse(const Document& d, const Accessor& accessor, const std::string& where) {

@@ -344,7 +344,8 @@ void check_compressed(const Document& d, const BufferView& view, const std::stri
   const uint128 end = static_cast<uint128>(from.byte_offset) + from.byte_length;
   if (end > source.byte_length)
     refuse(d.path, what + " ends past the " + std::to_string(source.byte_length) +
-                       " bytes of buffer " + std::to_string(from.buffer));
+                       " bytes of buffer " + std::to_string(from.buffer) +
+                       ", expected an end in the buffer");
   if (source.kind == BufferSource::Kind::kNone)
     refuse(
         d.path,

@@ -65,7 +65,16 @@ int bound_port(int socket) {
 
 Listener::Listener(const std::string& address, int port) {
   const Addresses found = resolve(address, port);
+  const auto refuse = [&](int failure) {
+    const std::string reason = errno_text(failure);
+    if (socket_ >= 0) close(socket_);
+    throw Error(ErrorCode::kIo, "cannot listen on " + address + " port " + std::to_string(port) +
+                                    " (" + reason +
+                                    "): expected an address of this machine, and a free port that "
+                                    "this user may use");
+  };
   socket_ = ::socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (socket_ < 0) refuse(errno);
   const int yes = 1;
   // Allows the use of a port whose old connections are still closing, but not of a port on which
   // another socket listens.
@@ -74,13 +83,9 @@ Listener::Listener(const std::string& address, int port) {
   // size of the buffers of both ends by the segment size, so the buffers of a connection would have
   // several MB.
   setsockopt(socket_, IPPROTO_TCP, TCP_MAXSEG, &kMaxSegmentBytes, sizeof kMaxSegmentBytes);
-  if (socket_ < 0 || bind(socket_, found->ai_addr, found->ai_addrlen) != 0 ||
-      ::listen(socket_, kBacklog) != 0 || pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0) {
-    const std::string reason = errno_text(errno);
-    if (socket_ >= 0) close(socket_);
-    throw Error(ErrorCode::kIo,
-                "cannot listen on " + address + " port " + std::to_string(port) + ": " + reason);
-  }
+  if (bind(socket_, found->ai_addr, found->ai_addrlen) != 0 || ::listen(socket_, kBacklog) != 0 ||
+      pipe2(wake_, O_CLOEXEC | O_NONBLOCK) != 0)
+    refuse(errno);
   port_ = bound_port(socket_);
 }
 

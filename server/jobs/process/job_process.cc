@@ -107,9 +107,10 @@ std::string result_json(const std::string& report_text, const std::string& outpu
   return result.dump();
 }
 
-// Runs or resumes the build and returns its RESULT (docs/api.md). The report and the result are the
-// last files that a build writes. If they exist, an earlier run finished the build, and only the
-// work folder may remain.
+// Runs or resumes the build and returns its RESULT, the JSON that docs/api.md defines. The .vdag
+// file and the report are the last files that a build writes. If both exist, an earlier run has
+// finished the build. Then this function only removes the work folder, if it is still there, and
+// makes the RESULT from these two files.
 std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildContext& context) {
   if (!context.files.exists(folder.report()) || !context.files.exists(folder.result()))
     return result_json(report_json(run_build(spec, context)), spec.run.output);

@@ -52,7 +52,7 @@ std::vector<std::string> export_spec_formats() {
 void check_export_spec(const ExportSpec& spec) {
   check_region(spec);
   if (spec.is_extract()) {
-    const std::string expectation = "a format of voxdag export, not vdag";
+    const std::string expectation = "'to' to be a format of voxdag export, not vdag";
     if (spec.gray) throw FieldError("gray", expectation);
     const FieldJson given = options_json(spec.options);
     if (!given.empty()) throw FieldError(given.begin().key(), expectation);
@@ -65,7 +65,7 @@ void check_export_spec(const ExportSpec& spec) {
     throw invalid_export("'to' is '" + printable_line(spec.to) + "': expected one of " +
                          joined(export_spec_formats()));
   if (spec.crop || spec.majority)
-    throw FieldError(spec.crop ? "crop" : "majority", "the format vdag, not " + spec.to);
+    throw FieldError(spec.crop ? "crop" : "majority", "'to' to be vdag, not " + spec.to);
   query::check_export_options(*format, spec.options);
 }
 

@@ -11,8 +11,8 @@ namespace voxdag::cuda_sim {
 
 struct BrokenProgram {
   const char* name;
-  void (*run)();          // does not return
-  const char* violation;  // required part of the message
+  void (*run)();          // ends the process with a message
+  const char* violation;  // part of this message
 };
 std::vector<BrokenProgram> broken_programs();
 

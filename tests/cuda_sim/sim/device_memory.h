@@ -2,8 +2,9 @@
 // whether it is allocated, and whether it was written. The range has no access rights while the
 // host runs.
 //
-//   1. Each allocation has separate pages, and can be used only by its device. It exists from the
-//      moment its allocation runs in its stream until its release runs.
+//   1. Each allocation has separate pages, and can be used only by its device. Allocating and
+//      releasing are operations of a stream. The memory exists from the moment the stream runs the
+//      first of them until it runs the second.
 //   2. Reading a byte that was never written is a violation, so the initial contents of an
 //      allocation do not matter. Released memory is filled with junk immediately. Its addresses are
 //      reused as late as possible.

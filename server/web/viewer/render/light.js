@@ -1,6 +1,6 @@
 // The light of a picture: the position of the sun, the exposure, the distance within which surfaces
 // hide the sky (skyReach), the distance at which haze begins (hazeStart), and the position of the
-// floor. Distances are in voxels. Exposure and the two distances follow the visible surfaces.
+// floor. Distances are in voxels. Exposure and the two distances adapt to the visible surfaces.
 
 import {length, scale, subtract} from "../vector.js";
 

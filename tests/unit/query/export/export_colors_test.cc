@@ -134,8 +134,9 @@ TEST_F(ExportColors, HashDagNamesTheLevelThatFits) {
   const Error refused = error_of([&] { bytes_of("hashdag", {kLevels, whole_grid(kLevels)}); });
   EXPECT_EQ(refused.code(), ErrorCode::kLimit);
   EXPECT_TRUE(refused.message().ends_with(
-      ": 68 719 476 736 voxels are selected, but HashDAG numbers at most 4 294 967 295 for colors "
-      "(--gray leaves them out). --level 10 (1024 voxels per edge) fits, or take a smaller "
+      ": 68 719 476 736 voxels are selected, but HashDAG can store the colors of at most "
+      "4 294 967 295 voxels (--gray leaves the colors out). --level 10 (1024 voxels per edge) "
+      "fits, or take a smaller "
       "--region"))
       << refused.message();
   EXPECT_EQ(system_files().list(folder_.path()).size(), 1u) << "only the input is there";

@@ -168,7 +168,7 @@ TEST_F(ExportLimits, GridsInMemoryAreRefusedByTheirSize) {
     if (name == "vdb" || name == "nvdb") {
       options_.grid = GridKind::kOfFormat;
       const std::string density = refusal(*file, name, "a.x", ErrorCode::kOutOfMemory, 20 << 20);
-      EXPECT_NE(density.find("(--grid mask takes less). --level 8 (256 voxels per edge) fits"),
+      EXPECT_NE(density.find(". --grid mask takes less. --level 8 (256 voxels per edge) fits"),
                 std::string::npos)
           << density;
       options_.grid = GridKind::kMask;
