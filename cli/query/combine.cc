@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "cli/output.h"
+#include "cli/query/attribute_options.h"
 #include "cli/query/combine_report.h"
 #include "cli/run_times.h"
 #include "cli/selection_options.h"
@@ -32,6 +33,7 @@ struct CombineCommand {
   std::string a, output, memory;
   std::string b[std::size(kOperationOptions)];  // the second file, at the index of its operation
   std::optional<std::array<int64_t, 3>> offset;
+  AttributeOptions attributes;
   bool clip = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
@@ -59,6 +61,7 @@ void run(const CombineCommand& command, CommandContext& context) {
   spec.output = command.output;
   spec.offset = command.offset;
   spec.clip = command.clip;
+  command.attributes.apply(spec);
   spec.replace = command.force;
   spec.memory_bytes = memory_limit(command.memory);
   spec.threads = command.threads;
@@ -85,6 +88,7 @@ void declare(Command& command, CombineCommand& state) {
       "move the second file: its voxel 0,0,0 comes to this voxel of the first file's grid");
   command.flag("--clip", state.clip,
                "drop voxels that --offset moves out of the grid; otherwise they are an error");
+  state.attributes.declare(command);
   command.output_option("-o,--output", state.output, "the .vdag file to write").required();
   command.memory_option(state.memory);
   command.threads_option(state.threads);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/output.h"
+#include "cli/query/attribute_options.h"
 #include "cli/query/combine_report.h"
 #include "cli/run_times.h"
 #include "cli/selection_options.h"
@@ -23,6 +24,7 @@ namespace {
 struct EditCommand {
   std::string input, output, memory;
   std::vector<std::string> cuts, scenes, parts;
+  AttributeOptions attributes;
   bool clip = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
@@ -53,6 +55,7 @@ class Edit {
         current_(command.input) {
     spec_.replace = true;
     spec_.clip = command.clip;
+    command.attributes.apply(spec_);
     spec_.memory_bytes = memory_limit(command.memory);
     spec_.threads = command.threads;
   }
@@ -96,8 +99,8 @@ class Edit {
       return query::combine(file, *other, spec_, files_, *progress_, context_.cancel);
     });
   }
-  // Builds the scenes of --add as one DAG, with the grid of the edited file, and writes it to
-  // scenes_path().
+  // Builds the scenes of --add as one DAG, with the grid and the attributes of the edited file, and
+  // writes it to scenes_path().
   void build_scenes() {
     const auto file = open_global_file(current_);
     BuildSpec build;
@@ -105,6 +108,11 @@ class Edit {
     build.geometry.resolution = static_cast<uint64_t>(file->resolution());
     build.geometry.bounds = {file->origin()[0], file->origin()[1], file->origin()[2], file->edge()};
     build.geometry.hash_bits = file->hash_bits();
+    if (spec_.attributes) build.geometry.attributes = attributes_of(*file);
+    for (const Attribute attribute : build.geometry.attributes.list())
+      build.geometry.color_resolution =
+          std::max(build.geometry.color_resolution,
+                   uint64_t{1} << section_of(*file, attribute).color_levels());
     build.run.output = scenes_path();
     build.run.report = "none";
     build.run.memory_bytes = spec_.memory_bytes;
@@ -142,7 +150,8 @@ void declare(Command& command, EditCommand& state) {
               "voxels of the grid; may be repeated")
       .one_value_each();
   command
-      .option("--add", state.scenes, "add a scene, built on the grid of the file; may be repeated")
+      .option("--add", state.scenes,
+              "add a scene, built with the grid and the attributes of the file; may be repeated")
       .one_value_each();
   command
       .option("--paste", state.parts,
@@ -151,6 +160,7 @@ void declare(Command& command, EditCommand& state) {
       .one_value_each();
   command.flag("--clip", state.clip,
                "drop voxels that --paste puts outside of the grid; otherwise they are an error");
+  state.attributes.declare(command);
   command.output_option("-o,--output", state.output, "the .vdag file to write").required();
   command.memory_option(state.memory);
   command.threads_option(state.threads);

@@ -71,6 +71,30 @@ def test_refuses(dags, tmp_path):
         voxdag.combine(a, b, "or", tmp_path / "c.vdag")
     with pytest.raises(TypeError):
         a | 3
-    colored = voxdag.from_voxels([[1, 2, 3]], [[255, 0, 0]], resolution=16)
-    with pytest.raises(voxdag.Error, match="has colors"):
-        a | colored
+    for color in ((1, 2), (0, 0, 256), "red", (1.5, 0, 0)):
+        with pytest.raises(voxdag.Error, match="three integers from 0 to 255"):
+            voxdag.combine(a, b, "union", fill_color=color)
+
+
+def test_colors():
+    red = voxdag.from_voxels([[1, 2, 3], [4, 5, 6]], [[255, 0, 0]] * 2, resolution=16)
+    blue = voxdag.from_voxels([[4, 5, 6], [7, 8, 9]], [[0, 0, 255]] * 2, resolution=16)
+    for combined, voxels, colors in (
+        (red | blue, [[1, 2, 3], [4, 5, 6], [7, 8, 9]], [[255, 0, 0]] * 2 + [[0, 0, 255]]),
+        (red ^ blue, [[1, 2, 3], [7, 8, 9]], [[255, 0, 0], [0, 0, 255]]),
+        (red & blue, [[4, 5, 6]], [[255, 0, 0]]),
+        (blue - red, [[7, 8, 9]], [[0, 0, 255]]),
+    ):
+        assert len(combined) == len(voxels)
+        assert np.allclose(combined.colors(voxels), colors, atol=48)  # colors are compressed
+
+
+def test_one_file_has_colors():
+    plain = voxdag.from_voxels([[0, 0, 0]], resolution=16)
+    red = voxdag.from_voxels([[1, 2, 3]], [[255, 0, 0]], resolution=16)
+    with pytest.raises(voxdag.Error, match=r"has colors and .* has none: expected"):
+        plain | red
+    filled = voxdag.combine(plain, red, "union", fill_color=(0, 255, 0))
+    colors = filled.colors([[0, 0, 0], [1, 2, 3]])
+    assert np.allclose(colors, [[0, 255, 0], [255, 0, 0]], atol=48)
+    assert voxdag.combine(plain, red, "union", no_attributes=True).attributes == []

@@ -151,6 +151,8 @@ def combine(
     *,
     offset: Optional[tuple[int, int, int]] = None,
     clip: bool = False,
+    fill_color: Optional[tuple[int, int, int]] = None,
+    no_attributes: bool = False,
     memory: Union[int, str, None] = None,
     threads: int = 0,
     force: bool = False,
@@ -159,29 +161,36 @@ def combine(
     """Combines two .vdag files into a new .vdag file, and returns its Dag. For two Dags, `a | b`,
     `a - b`, `a & b` and `a ^ b` do the same.
 
-    a, b       two .vdag files, as paths or Dags. Without `offset`, they must have the same grid.
-               They must have been built with the same `hash_bits`, and without colors and other
-               attributes.
-    operation  "union" sets the voxels that are set in `a` or in `b`, "minus" the voxels that are
-               set in `a` but not in `b`, "and" the voxels that are set in both files, and "xor"
-               the voxels that are set in exactly one of the files.
-    output     the .vdag file to write. By default it is a temporary file, which is removed when the
-               Dag is closed or no longer used.
-    offset     three integers. They move `b`, so that its voxel 0, 0, 0 comes to this voxel of the
-               grid of `a`. Then the grids may differ, but their voxels must have the same size.
-    clip       if True, drops the voxels of `b` that `offset` moves out of the grid of `a`. By
-               default, such voxels are an error.
-    memory     memory limit, as a number of bytes or as text such as "8GiB". The default is half of
-               the machine's memory.
-    threads    number of threads; 0 means all cores
-    force      if True, replaces an existing output
-    progress   as in build()
+    a, b           two .vdag files, as paths or Dags. Without `offset`, they must have the same
+                   grid. They must have been built with the same `hash_bits`. The result also has
+                   colors and other attributes: a cell has the value of `a` if `a` has a voxel in
+                   it, otherwise the value of `b`. For "union" and "xor", both files must have the
+                   same attributes.
+    operation      "union" sets the voxels that are set in `a` or in `b`, "minus" the voxels that
+                   are set in `a` but not in `b`, "and" the voxels that are set in both files, and
+                   "xor" the voxels that are set in exactly one of the files.
+    output         the .vdag file to write. By default it is a temporary file, which is removed when
+                   the Dag is closed or no longer used.
+    offset         three integers. They move `b`, so that its voxel 0, 0, 0 comes to this voxel of
+                   the grid of `a`. Then the grids may differ, but their voxels must have the same
+                   size.
+    clip           if True, drops the voxels of `b` that `offset` moves out of the grid of `a`. By
+                   default, such voxels are an error.
+    fill_color     for "union" and "xor", if only one file has colors: the color of the cells in
+                   which this file has no voxel, as three integers from 0 to 255 (sRGB)
+    no_attributes  if True, the result has no colors and other attributes
+    memory         memory limit, as a number of bytes or as text such as "8GiB". The default is half
+                   of the machine's memory.
+    threads        number of threads; 0 means all cores
+    force          if True, replaces an existing output
+    progress       as in build()
 
     Raises Error if an argument is invalid, if `a` and `b` do not meet these conditions, if the
     output exists, or if the operation fails.
     """
     paths = path_text(a), path_text(b)
     moved = None if offset is None else _voxel_of(offset)
+    fill = None if fill_color is None else _color_of(fill_color)
     folder = tempfile.mkdtemp(prefix="voxdag-") if output is None else None
     path = f"{folder}/combined.vdag" if output is None else path_text(output)
     try:
@@ -192,6 +201,8 @@ def combine(
                 path,
                 moved,
                 clip,
+                fill,
+                bool(no_attributes),
                 memory_text(memory),
                 thread_count(threads),
                 force,
@@ -272,3 +283,13 @@ def _voxel_of(offset: tuple[int, int, int]) -> tuple[int, int, int]:
     except (AttributeError, TypeError, ValueError):
         raise Error(f"offset={offset!r}: expected three integers", "invalid_input") from None
     return x, y, z
+
+
+def _color_of(color: tuple[int, int, int]) -> tuple[int, int, int]:
+    try:
+        r, g, b = (int(channel.__index__()) for channel in color)
+    except (AttributeError, TypeError, ValueError):
+        r = g = b = -1
+    if not all(0 <= channel <= 255 for channel in (r, g, b)):
+        raise Error(f"fill_color={color!r}: expected three integers from 0 to 255", "invalid_input")
+    return r, g, b

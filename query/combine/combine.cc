@@ -7,19 +7,20 @@
 
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "core/format/global/diff.h"
 #include "core/format/global/global_writer.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/geometry/cube.h"
+#include "query/attributes/combined_section.h"
 #include "query/combine/count_levels.h"
 #include "query/combine/join.h"
 #include "query/combine/level_writer.h"
 #include "query/combine/moved.h"
 #include "query/combine/pair_levels.h"
 #include "query/dag/locked_outputs.h"
-#include "query/dag/refuse_attributes.h"
 #include "query/dag/refuse_order.h"
 #include "query/dag/temporary_work.h"
 
@@ -36,7 +37,6 @@ constexpr uint64_t kWindowShare = 32;
 // The hashes of all nodes are in memory if they fit in memory_bytes / kHashShare.
 constexpr uint64_t kHashShare = 8;
 constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
-constexpr const char* kNoAttributes = "which combine cannot join";
 
 void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, bool is_moved) {
   const auto voxel_edge = [](const voxdag_reader::File& file) {
@@ -53,9 +53,43 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
                 "only files with equal hash bits can be combined: " + a.path() + " has " +
                     std::to_string(a.hash_bits()) + "; " + b.path() + " has " +
                     std::to_string(b.hash_bits()));
-  refuse_attributes(b, kNoAttributes);
   refuse_other_order(a);
   if (!is_moved) refuse_other_order(b);  // move_file() sorts the nodes by hash
+}
+
+// Returns the attributes of the result in the order of their sections: for kMinus, A's attributes;
+// for kAnd, the attributes of A or B; for kUnion and kXor, the attributes that both files have. A
+// file without voxels counts as a file with all attributes. Throws Error{kInvalidInput} for kUnion
+// and kXor if only one file has an attribute, except for colors if `can_fill` is true.
+std::vector<CombinedAttribute> combined_attributes(const voxdag_reader::File& a,
+                                                   const voxdag_reader::File& b,
+                                                   Operation operation, bool can_fill) {
+  std::vector<CombinedAttribute> combined;
+  const AttributeSet in_a = attributes_of(a), in_b = attributes_of(b);
+  for (const AttributeTraits& row : kAttributeTable) {
+    const bool has_a = in_a.has(row.attribute), has_b = in_b.has(row.attribute);
+    if (!has_a && !has_b) continue;
+    if (operation == Operation::kMinus) {
+      if (has_a) combined.push_back({row.attribute, true, false});
+      continue;
+    }
+    if (operation == Operation::kAnd) {
+      combined.push_back({row.attribute, has_a, !has_a});
+      continue;
+    }
+    const voxdag_reader::File& other = has_a ? b : a;
+    const bool is_complete = has_a == has_b || other.empty() || (row.is_color() && can_fill);
+    if (!is_complete)
+      throw Error(ErrorCode::kInvalidInput,
+                  (has_a ? a : b).path() + " has " + row.plural + " and " + other.path() +
+                      " has none: expected " + row.plural + " in both files, " +
+                      (row.is_color()
+                           ? option_text("fill_color") + " with a color for " + other.path() + ", "
+                           : std::string()) +
+                      "or " + option_text("no_attributes") + " to combine only the voxels");
+    combined.push_back({row.attribute, has_a, has_b});
+  }
+  return combined;
 }
 
 // The temporary folder of one combine() or cut(), its memory budget, and the budget's shares.
@@ -122,14 +156,39 @@ NewCounts write_levels(DagInput& a, DagInput& b, NewLevels& levels, const Worksp
   return {{.voxels = total.voxels, .svo_nodes = total.nodes}, writer.dag_nodes()};
 }
 
+// Copies the levels of `from` to `out`.
+void copy_levels(DagInput& from, GlobalFileWriter& out) {
+  constexpr uint64_t kChunkWords = uint64_t{1} << 16;
+  for (uint32_t level = from.file().brick_level() + 1; level-- > 0;) {
+    const voxdag_reader::Level& words = from.level(level);
+    out.begin_level(level);
+    for (uint64_t first = 0; first < words.word_count; first += kChunkWords) {
+      const auto chunk = from.words(level, first, std::min(kChunkWords, words.word_count - first));
+      out.checksum_words(chunk);
+      out.write_words(first, chunk);
+    }
+    out.end_level({words.node_count, words.word_count});
+  }
+}
+
+// Attributes of a new file. `b` is the second file as it was given, and `offset` the place of its
+// voxel (0, 0, 0) in the grid of the first file.
+struct AttributeInputs {
+  std::vector<CombinedAttribute> attributes;
+  const voxdag_reader::File& b;
+  std::array<int64_t, 3> offset = {};
+};
+
 class Combination {
  public:
   // If `shape` is not null, the shape is subtracted from `a`; `b` must then be a file without
   // nodes.
   Combination(const voxdag_reader::File& a, const voxdag_reader::File& b, const Shape* shape,
-              Workspace& work, Progress& progress, const CancelToken& cancel)
+              const AttributeInputs& attributes, Workspace& work, Progress& progress,
+              const CancelToken& cancel)
       : work_(work),
         shape_(shape),
+        attributes_(attributes),
         progress_(progress),
         cancel_(cancel),
         a_(a, work.spec.memory_bytes, cancel),
@@ -142,30 +201,65 @@ class Combination {
   // Writes the output. Calls before_publish() just before the output gets its final name. If
   // before_publish() throws, the output is discarded.
   CombineReport run(const std::function<void()>& before_publish) {
-    GlobalFileWriter out(work_.files, work_.spec.output, grid_of(a_.file()), a_.file().hash_bits(),
-                         work_.spec.narrow_words);
-    NewLevels levels(work_.space);
-    const uint64_t pairs = find_levels(levels);
-    const NewCounts counts = write_levels(a_, b_, levels, work_, out, progress_);
-    if (counts.octree.voxels == 0)
-      progress_.warn("the result has no voxels: the file will have no nodes");
+    GlobalFileWriter out = writer(work_.spec.output);
+    CombineReport report = attributes_.attributes.empty() ? write_voxels(out) : write_all(out);
+    if (report.voxels == 0) progress_.warn("the result has no voxels: the file will have no nodes");
     progress_.begin_stage("write", 1, "files");
-    const GlobalFileSummary summary = out.seal(counts.octree, work_.spec.threads, cancel_);
+    const GlobalFileSummary summary = out.seal(
+        {.voxels = report.voxels, .svo_nodes = report.svo_nodes}, work_.spec.threads, cancel_);
     before_publish();
     out.publish();
     progress_.advance(1);
     progress_.end_stage();
-    return {.grid = grid_of(a_.file()),
-            .voxels = counts.octree.voxels,
-            .svo_nodes = counts.octree.svo_nodes,
-            .dag_nodes = counts.dag_nodes,
-            .bytes = summary.bytes,
-            .sha256 = summary.sha256,
-            .pairs = pairs,
-            .work_bytes = work_.scratch.bytes_written()};
+    report.grid = grid_of(a_.file());
+    report.bytes = summary.bytes;
+    report.sha256 = summary.sha256;
+    report.work_bytes += work_.scratch.bytes_written();
+    return report;
   }
 
  private:
+  GlobalFileWriter writer(const std::string& path) const {
+    return GlobalFileWriter(work_.files, path, grid_of(a_.file()), a_.file().hash_bits(),
+                            work_.spec.narrow_words);
+  }
+  // Writes the levels of the new file. Returns a report with the numbers of voxels, nodes and
+  // pairs.
+  CombineReport write_voxels(GlobalFileWriter& out) {
+    NewLevels levels(work_.space);
+    const uint64_t pairs = find_levels(levels);
+    const NewCounts counts = write_levels(a_, b_, levels, work_, out, progress_);
+    CombineReport report;
+    report.voxels = counts.octree.voxels;
+    report.svo_nodes = counts.octree.svo_nodes;
+    report.dag_nodes = counts.dag_nodes;
+    report.pairs = pairs;
+    return report;
+  }
+  // Writes the levels and the attributes of the new file. The levels are written to a temporary
+  // file first, because the attributes follow from the set cells of the result.
+  CombineReport write_all(GlobalFileWriter& out) {
+    const std::string path = work_.folder.path() + "/levels.vdag";
+    GlobalFileWriter levels = writer(path);
+    CombineReport report = write_voxels(levels);
+    if (report.voxels == 0) return report;
+    report.work_bytes =
+        levels.finish({.voxels = report.voxels, .svo_nodes = report.svo_nodes}).bytes;
+    const auto result = open_global_file(path);
+    const WatchedFile watched(*result);
+    watched.run([&] {
+      DagInput input(*result, work_.spec.memory_bytes, cancel_);
+      copy_levels(input, out);
+      const CombinedFiles from{*result, a_.file(), attributes_.b, attributes_.offset,
+                               work_.spec.fill_color};
+      for (const CombinedAttribute& attribute : attributes_.attributes)
+        write_combined_attribute(from, attribute, work_.files, out, work_.budget,
+                                 work_.spec.threads, progress_, cancel_);
+      watched.check_readable();
+    });
+    return report;
+  }
+
   uint32_t level_count() const { return a_.file().brick_level() + 1; }
 
   // Joins every level of the two files (join.h), from the bricks up. For each level, returns the
@@ -198,6 +292,7 @@ class Combination {
 
   Workspace& work_;
   const Shape* const shape_;
+  const AttributeInputs& attributes_;
   Progress& progress_;
   const CancelToken& cancel_;
   DagInput a_;
@@ -205,22 +300,18 @@ class Combination {
   SpillSpace hash_space_;
 };
 
-// Writes the second file, moved by work.spec.offset into the grid of the first file, to a temporary
+// Writes the second file, moved by moved.offset into the grid of the first file, to a temporary
 // file. Returns this file, opened.
 std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
-                                               const voxdag_reader::File& b, Workspace& work,
+                                               const AttributeInputs& moved, Workspace& work,
                                                Progress& progress, const CancelToken& cancel) {
-  // Limits the offset to prevent overflow. With an offset of kFar, all voxels of `b` are already
-  // outside the grid of `a`.
-  constexpr int64_t kFar = int64_t{1} << (kMaxGridLevels + 1);
-  std::array<int64_t, 3> offset = *work.spec.offset;
-  for (int64_t& distance : offset) distance = std::clamp(distance, -kFar, kFar);
-  DagInput target(a, work.spec.memory_bytes, cancel), input(b, work.spec.memory_bytes, cancel);
+  DagInput target(a, work.spec.memory_bytes, cancel),
+      input(moved.b, work.spec.memory_bytes, cancel);
   const std::string path = work.folder.path() + "/moved.vdag";
   GlobalFileWriter out(work.files, path, grid_of(a), a.hash_bits(), work.spec.narrow_words);
   NewLevels levels(work.space);
-  levels.pairs =
-      MovedLevels(input, a.grid_levels(), offset, a.hash_bits(), work.space).descend(levels.bricks);
+  levels.pairs = MovedLevels(input, a.grid_levels(), moved.offset, a.hash_bits(), work.space)
+                     .descend(levels.bricks);
   for (size_t i = 0; i < levels.pairs.size(); ++i)
     levels.joined.push_back(std::make_unique<JoinedLevel>(work.space, work.space));
   out.finish(write_levels(target, target, levels, work, out, progress).octree);
@@ -235,10 +326,11 @@ std::unique_ptr<voxdag_reader::File> empty_file(const voxdag_reader::File& a, Wo
   return open_global_file(path);
 }
 
-CombineReport combine_moved(const voxdag_reader::File& a, const voxdag_reader::File& b,
+CombineReport combine_moved(const voxdag_reader::File& a, const AttributeInputs& attributes,
                             Workspace& work, Progress& progress, const CancelToken& cancel,
                             const std::function<void()>& before_publish) {
-  const auto moved = move_file(a, b, work, progress, cancel);
+  const voxdag_reader::File& b = attributes.b;
+  const auto moved = move_file(a, attributes, work, progress, cancel);
   const uint64_t clipped = b.voxels() - moved->voxels();
   if (clipped > 0 && !work.spec.clip)
     throw Error(ErrorCode::kInvalidInput,
@@ -246,9 +338,17 @@ CombineReport combine_moved(const voxdag_reader::File& a, const voxdag_reader::F
                     std::to_string(b.voxels()) + " voxels would be outside of the grid of " +
                     a.path() + ": expected another offset, or --clip to drop them");
   CombineReport report =
-      Combination(a, *moved, nullptr, work, progress, cancel).run(before_publish);
+      Combination(a, *moved, nullptr, attributes, work, progress, cancel).run(before_publish);
   report.clipped = clipped;
   return report;
+}
+
+// Limits the offset to prevent overflow. With an offset of kFar, all voxels of the second file are
+// already outside the grid of the first file.
+std::array<int64_t, 3> limited(std::array<int64_t, 3> offset) {
+  constexpr int64_t kFar = int64_t{1} << (kMaxGridLevels + 1);
+  for (int64_t& distance : offset) distance = std::clamp(distance, -kFar, kFar);
+  return offset;
 }
 
 }  // namespace
@@ -256,8 +356,10 @@ CombineReport combine_moved(const voxdag_reader::File& a, const voxdag_reader::F
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel) {
-  refuse_attributes(a, kNoAttributes);
   refuse_unequal(a, b, spec.offset.has_value());
+  AttributeInputs attributes{{}, b, limited(spec.offset.value_or(std::array<int64_t, 3>{}))};
+  if (spec.attributes)
+    attributes.attributes = combined_attributes(a, b, spec.operation, spec.fill_color.has_value());
   LockedOutputs outputs(files, {{spec.output}, {a.path(), b.path()}, spec.replace});
   const WatchedFile watched_a(a), watched_b(b);
   const auto check_readable = [&] {
@@ -266,22 +368,24 @@ CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b
   };
   const auto run = [&] {
     Workspace work(spec, outputs.files());
-    if (spec.offset) return combine_moved(a, b, work, progress, cancel, check_readable);
-    return Combination(a, b, nullptr, work, progress, cancel).run(check_readable);
+    if (spec.offset) return combine_moved(a, attributes, work, progress, cancel, check_readable);
+    return Combination(a, b, nullptr, attributes, work, progress, cancel).run(check_readable);
   };
   return watched_a.run([&] { return watched_b.run([&] { return with_reader_errors(run); }); });
 }
 
 CombineReport cut(const voxdag_reader::File& a, const Shape& shape, const CombineSpec& spec,
                   FileSystem& files, Progress& progress, const CancelToken& cancel) {
-  refuse_attributes(a, kNoAttributes);
   refuse_other_order(a);
   LockedOutputs outputs(files, {{spec.output}, {a.path()}, spec.replace});
   const WatchedFile watched(a);
   const auto run = [&] {
     Workspace work(spec, outputs.files());
     const auto empty = empty_file(a, work);
-    return Combination(a, *empty, &shape, work, progress, cancel).run([&] {
+    AttributeInputs attributes{{}, *empty};
+    if (spec.attributes)
+      attributes.attributes = combined_attributes(a, *empty, Operation::kMinus, false);
+    return Combination(a, *empty, &shape, attributes, work, progress, cancel).run([&] {
       watched.check_readable();
     });
   };

@@ -8,6 +8,8 @@
 //   moved.h         the second file at an offset, which is written to a temporary file first
 //   shape.h         spheres and boxes as the second operand
 //
+// query/attributes/combined_section.h writes colors and other attributes of the new file.
+//
 // pair_levels.h and moved.h work from the root down to the bricks. join.h, level_writer.h and
 // count_levels.h work from the bricks up to the root.
 //
@@ -43,8 +45,14 @@ struct CombineSpec {
   std::optional<std::array<int64_t, 3>> offset;
   bool clip = false;     // drop moved voxels outside of the grid; otherwise they are an error
   bool replace = false;  // replace an existing file
+  // If false, the new file has no attributes.
+  bool attributes = true;
+  // If only one of the files has colors, the color of the cells in which this file has no voxel.
+  std::optional<voxdag_reader::Rgb> fill_color;
   uint64_t memory_bytes = uint64_t{1} << 30;
-  unsigned threads = 1;  // with 2 or more, the digest is computed while the file is read back
+  // Threads that encode attributes. With 2 or more, the digest is computed while the file is read
+  // back.
+  unsigned threads = 1;
   // Maximum number of words in a narrow level. A level with more words is wide: pointers into it
   // have 64 bits instead of 32. Tests use a smaller limit.
   uint64_t narrow_words = global_layout::kNarrowLevelWords;
@@ -69,9 +77,10 @@ struct CombineReport {
 // are in a folder next to the output; combine() removes the folder at the end, also after an error.
 // If the process is killed, the next combine with the same output removes the folder. Throws Error:
 // - kInvalidInput if the files have different grids (with spec.offset: different edges of a voxel)
-//   or different hash bits, if a file has attributes or another node order than the order by hash
-//   (with spec.offset, the second file can have any order), or if moved voxels are outside of the
-//   grid and spec.clip is false;
+//   or different hash bits, if a file has another node order than the order by hash (with
+//   spec.offset, the second file can have any order), if moved voxels are outside of the grid and
+//   spec.clip is false, or if the operation needs an attribute that only one file has
+//   (docs/extract.md);
 // - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled; and the errors of
 //   LockedOutputs.
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,

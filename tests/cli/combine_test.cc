@@ -70,7 +70,7 @@ TEST_F(Combine, Refusals) {
   expect_error(2, "files of the same grid",
                {"combine", "a.vdag", "--union", "small.vdag", "-o", "x.vdag"});
   build({"b.glb"}, "colored.vdag", {"--color"});
-  expect_error(2, "colored.vdag has colors",
+  expect_error(2, "colored.vdag has colors and a.vdag has none: expected colors in both files",
                {"combine", "a.vdag", "--union", "colored.vdag", "-o", "x.vdag"});
   put("mine.txt", "not a DAG");
   expect_error(2, "mine.txt", {"combine", "a.vdag", "--union", "b.vdag", "-o", "mine.txt"});

@@ -90,6 +90,30 @@ TEST_F(Edit, Spheres) {
   EXPECT_EQ(cut["sha256"], run_json({"info", "c.vdag", "--digest"})["sha256"]);
 }
 
+// Cuts keep the colors of the other voxels, --add builds the scene with colors, and a part is
+// pasted with its colors.
+TEST_F(Edit, Colors) {
+  build({"a.glb"}, "a.vdag", {}, {"--color", "--color-resolution", "64", "--force"});
+  const auto different = [&](const std::string& x, const std::string& y) {
+    return Json::parse(run({"diff", x, y, "--color", "--json"}).out)["colors"]["different"];
+  };
+  const std::string region = "32,0,64,64,32,96";
+  run_json({"edit", "a.vdag", "--cut", "box:" + region, "-o", "hole.vdag"});
+  EXPECT_EQ(different("hole.vdag", "a.vdag"), 0);
+  run_json({"extract", "a.vdag", "--region", region, "--crop", "-o", "part.vdag"});
+  run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,0,64", "-o", "back.vdag"});
+  EXPECT_EQ(different("back.vdag", "a.vdag"), 0);
+  const Json both = build({"a.glb", "b.glb"}, "both.vdag", {}, {"--color"});
+  const Json added = run_json({"edit", "a.vdag", "--add", "b.glb", "-o", "added.vdag"});
+  EXPECT_EQ(added["voxels"], both["voxels"]);
+  EXPECT_EQ(run_json({"info", "added.vdag"})["colors"]["resolution"], 64);
+  EXPECT_EQ(run({"verify", "added.vdag"}).status, 0);
+  const Json plain =
+      run_json({"edit", "a.vdag", "--add", "b.glb", "--no-attributes", "-o", "plain.vdag"});
+  EXPECT_EQ(plain["voxels"], both["voxels"]);
+  EXPECT_FALSE(run_json({"info", "plain.vdag"}).contains("colors"));
+}
+
 TEST_F(Edit, RefusesBadArguments) {
   expect_error(2, "no edit was given: expected --cut, --add or --paste",
                {"edit", "a.vdag", "-o", "x.vdag"});
@@ -102,10 +126,11 @@ TEST_F(Edit, RefusesBadArguments) {
   expect_error(2, "mine.txt", {"edit", "a.vdag", "--cut", "sphere:0,0,0,5", "-o", "mine.txt"});
   EXPECT_EQ(contents("mine.txt"), "not a DAG");
   build({"a.glb"}, "colored.vdag", {}, {"--color"});
-  expect_error(2, "colored.vdag has colors",
-               {"edit", "colored.vdag", "--cut", "sphere:0,0,0,5", "-o", "x.vdag"});
-  expect_error(2, "colored.vdag has colors",
+  expect_error(2, "--fill-color",
                {"edit", "a.vdag", "--paste", "colored.vdag@0,0,0", "-o", "x.vdag"});
+  expect_error(2, "six hexadecimal digits",
+               {"edit", "a.vdag", "--paste", "colored.vdag@0,0,0", "--fill-color", "#ff000", "-o",
+                "x.vdag"});
   EXPECT_FALSE(exists("x.vdag") || exists("x.vdag.partial") || exists("x.vdag.lock"));
 }
 

@@ -6,6 +6,7 @@
 #include "tests/support/error_of.h"
 #include "tests/support/faulty_files.h"
 #include "tests/support/killed.h"
+#include "tests/unit/core/format/color/colored_files.h"
 #include "tests/unit/query/combine/combine_fixture.h"
 
 namespace voxdag::query {
@@ -17,6 +18,13 @@ class CombineErrors : public Combine {
     write_global(path("a"), random_voxels(7, 64));
     write_global(path("b"), random_voxels(8, 64));
   }
+  // Replaces a and b by files with colors.
+  void use_colored_files() {
+    write_colored(path("a"), {6, 6, random_codes(7, 6, 500), smooth_colors(6, 20)});
+    write_colored(path("b"), {6, 5, random_codes(8, 6, 500), smooth_colors(5, 20)});
+  }
+  void check_full_disk();
+  void check_killed();
   // Writes the union of a and b, with so little memory that lists of over 256 bytes are in scratch
   // files. Returns the code of the error; nullopt without an error.
   std::optional<ErrorCode> combine_error(FileSystem& files, const CancelToken& cancel) {
@@ -89,7 +97,7 @@ TEST_F(CombineErrors, HostileLevels) {
 }
 
 // If the disk is full from the n-th write on, combine() fails with kNoSpace.
-TEST_F(CombineErrors, FullDisk) {
+void CombineErrors::check_full_disk() {
   uint64_t failed = 0;
   for (uint64_t at = 1;; at += 1 + at / 4) {
     SCOPED_TRACE(at);
@@ -101,6 +109,13 @@ TEST_F(CombineErrors, FullDisk) {
     ++failed;
   }
   EXPECT_GT(failed, 5u);
+  std::filesystem::remove(path("out"));
+}
+
+TEST_F(CombineErrors, FullDisk) {
+  check_full_disk();
+  use_colored_files();
+  check_full_disk();
 }
 
 // If the n-th read of a temporary file or of the output fails, combine() fails with kIo.
@@ -121,7 +136,7 @@ TEST_F(CombineErrors, FailingReads) {
 // The process is killed after each of many operations. The same command then succeeds, and removes
 // the temporary files of the killed process. If the killed process had already finished its output,
 // the command refuses to replace it.
-TEST_F(CombineErrors, Killed) {
+void CombineErrors::check_killed() {
   combine_error(system_files(), never_);
   const std::string clean = bytes("out");
   std::filesystem::remove(path("out"));
@@ -142,6 +157,13 @@ TEST_F(CombineErrors, Killed) {
     std::filesystem::remove(path("out"));
   }
   EXPECT_GT(repeated, 5u);
+  std::filesystem::remove(path("out"));
+}
+
+TEST_F(CombineErrors, Killed) {
+  check_killed();
+  use_colored_files();
+  check_killed();
 }
 
 TEST_F(CombineErrors, Canceled) {

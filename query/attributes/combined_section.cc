@@ -1,0 +1,464 @@
+#include "query/attributes/combined_section.h"
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+#include <numeric>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "core/base/error.h"
+#include "core/color/blocks/value_region.h"
+#include "core/format/color/attribute_section_writer.h"
+#include "core/format/color/color_layout.h"
+#include "core/format/global/open_global.h"
+#include "core/geometry/morton.h"
+#include "query/attributes/material_names.h"
+#include "query/attributes/placed_cube.h"
+#include "query/attributes/region_batches.h"
+#include "query/attributes/resident_pages.h"
+#include "query/attributes/stored_section.h"
+#include "query/dag/dag_view.h"
+
+namespace voxdag::query {
+namespace {
+
+using voxdag_reader::ColorCursor;
+using voxdag_reader::ColorRegion;
+using voxdag_reader::ColorSection;
+using Position = std::array<int64_t, 3>;
+
+// In this file, levels and codes are levels and Morton codes of the result's grid, except where a
+// name begins with `file_`: these are levels and codes of a source's grid. A region is a color
+// region (combined_section.h).
+
+Position position_of(uint64_t code) {
+  uint32_t x, y, z;
+  morton_decode(code, x, y, z);
+  return {x, y, z};
+}
+
+// A file from which the result takes values.
+class Source {
+ public:
+  Source(const voxdag_reader::File& file, Attribute attribute, uint32_t grid_levels,
+         const Position& offset, FileSystem& files, MemoryBudget& budget)
+      : stored_(file, attribute, files, budget),
+        dag_(file),
+        grid_levels_(grid_levels),
+        offset_(offset) {}
+
+  StoredSection& stored() { return stored_; }
+  const StoredSection& stored() const { return stored_; }
+  const ColorSection& section() const { return stored_.section(); }
+  const DagView& dag() const { return dag_; }
+
+  // Returns the level of the file whose cubes have the edge of the cubes of `level`. It is negative
+  // if these cubes are larger than the file's grid.
+  int64_t file_level(uint32_t level) const {
+    return static_cast<int64_t>(stored_.file().grid_levels()) - grid_levels_ + level;
+  }
+  // Returns the level of the result whose cubes have the edge of the file's finest cells. It is
+  // negative if these cells are larger than the result's grid.
+  int64_t finest() const {
+    const int64_t up = stored_.file().grid_levels() - section().color_levels();
+    return grid_levels_ - up;
+  }
+  // True if each cube of `level` is at the place of a cube of the same edge of the file, or outside
+  // the file's grid.
+  bool is_aligned(uint32_t level) const {
+    const auto is_multiple = [&](int64_t distance) { return (distance & (edge(level) - 1)) == 0; };
+    return std::ranges::all_of(offset_, is_multiple);
+  }
+
+  // Calls visit(file_position, overlap) for the positions of the file's cubes of file_level(level)
+  // that overlap the cube at `code`, in the order of x, y and z. A position may be outside the
+  // file's grid. `overlap` is the common volume in voxels.
+  template <class Visit>
+  void for_each_overlap(uint32_t level, uint64_t code, const Visit& visit) const {
+    const Position at = position_of(code);
+    const int64_t size = edge(level);
+    Position first, rest;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const int64_t low = at[axis] * size - offset_[axis];
+      rest[axis] = low & (size - 1);
+      first[axis] = (low - rest[axis]) / size;
+    }
+    for (size_t i = 0; i < 8; ++i) {
+      Position position = first;
+      uint64_t overlap = 1;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const bool is_upper = i >> (2 - axis) & 1;
+        position[axis] += is_upper;
+        overlap *= static_cast<uint64_t>(is_upper ? rest[axis] : size - rest[axis]);
+      }
+      if (overlap > 0) visit(position, overlap);
+    }
+  }
+
+  // Returns the Morton code of the file's cube at the place of the cube at `code`; nothing if the
+  // place is outside the file's grid. is_aligned(level) must be true.
+  std::optional<uint64_t> file_code(uint32_t level, uint64_t code) const {
+    std::optional<uint64_t> found;
+    for_each_overlap(level, code, [&](const Position& at, uint64_t) {
+      if (is_inside(level, at)) found = morton(at);
+    });
+    return found;
+  }
+
+  // Finds the value of a cell (combined_section.h): returns the region that has it, valid until
+  // the next call, and sets `i` to its index in the region. Returns null if the file has no voxel
+  // there.
+  const ColorRegion* find(ColorCursor& cursor, uint32_t level, uint64_t code, uint64_t& i) const {
+    struct Candidate {
+      Position at;
+      uint64_t overlap;
+    };
+    std::array<Candidate, 8> candidates;
+    size_t count = 0;
+    for_each_overlap(level, code, [&](const Position& at, uint64_t overlap) {
+      candidates[count++] = {at, overlap};
+    });
+    const auto used = std::span(candidates).first(count);
+    if (count > 1) std::ranges::stable_sort(used, std::greater(), &Candidate::overlap);
+    for (const auto& [at, overlap] : used)
+      if (const ColorRegion* const region =
+              cursor.find(at[0], at[1], at[2], static_cast<uint32_t>(file_level(level)), i))
+        return region;
+    return nullptr;
+  }
+
+  // Verifies the file's values in the cube at `code`, down to the level `finest`.
+  void check_values(uint32_t finest, uint32_t level, uint64_t code) {
+    const auto file_finest = static_cast<uint32_t>(file_level(finest));
+    if (file_level(level) < 0) return stored_.check_values(file_finest, 0, 0);
+    for_each_overlap(level, code, [&](const Position& at, uint64_t) {
+      if (is_inside(level, at))
+        stored_.check_values(file_finest, static_cast<uint32_t>(file_level(level)), morton(at));
+    });
+  }
+
+ private:
+  int64_t edge(uint32_t level) const { return int64_t{1} << (grid_levels_ - level); }
+  bool is_inside(uint32_t level, const Position& at) const {
+    const int64_t levels = file_level(level);
+    return levels >= 0 &&
+           std::ranges::all_of(at, [&](int64_t i) { return i >= 0 && i < int64_t{1} << levels; });
+  }
+  static uint64_t morton(const Position& at) {
+    return morton_encode(static_cast<uint32_t>(at[0]), static_cast<uint32_t>(at[1]),
+                         static_cast<uint32_t>(at[2]));
+  }
+
+  StoredSection stored_;
+  const DagView dag_;
+  const uint32_t grid_levels_;  // of the result
+  const Position offset_;
+};
+
+// An encoded region, and the index of the source from which it was copied; kEncoded if it was
+// encoded.
+constexpr size_t kEncoded = ~size_t{0};
+struct MadeRegion {
+  EncodedRegion region;
+  size_t copied_from = kEncoded;
+};
+
+class CombinedColors {
+ public:
+  CombinedColors(const CombinedFiles& from, const CombinedAttribute& attribute, FileSystem& files,
+                 MemoryBudget& budget, const CancelToken& cancel)
+      : traits_(traits_of(attribute.attribute)),
+        result_(from.result),
+        dag_(from.result),
+        fill_(from.fill),
+        cancel_(cancel) {
+    const uint32_t levels = result_.grid_levels();
+    if (attribute.from_a)
+      sources_.push_back(
+          std::make_unique<Source>(from.a, attribute.attribute, levels, Position{}, files, budget));
+    if (attribute.from_b)
+      sources_.push_back(std::make_unique<Source>(from.b, attribute.attribute, levels, from.offset,
+                                                  files, budget));
+    int64_t finest = kBrickLevels;
+    for (const auto& source : sources_) finest = std::max(finest, source->finest());
+    levels_ = static_cast<uint32_t>(finest);
+    below_.resize(color_layout::tier_count(levels_));
+    if (traits_.has_names()) join_materials();
+  }
+
+  // Number of levels of the grid of finest cells.
+  uint32_t levels() const { return levels_; }
+  // The list of materials.
+  const std::vector<std::string>& names() const { return names_; }
+  // Must be called before the functions below. `workers` is the number of threads that call make().
+  void start(uint64_t limit_bytes, unsigned workers) {
+    std::vector<const voxdag_reader::File*> mapped = {&result_};
+    for (const auto& source : sources_) {
+      source->stored().check_index(static_cast<uint32_t>(source->file_level(levels_)));
+      mapped.push_back(&source->stored().file());
+    }
+    pages_ = std::make_unique<ResidentPages>(std::move(mapped), limit_bytes, workers);
+  }
+  void release_pages() const { pages_->release(); }
+
+  // Calls visit(cube) for the cube of each region in the finest tier, in Morton order.
+  template <class Visit>
+  void for_each_region(const Visit& visit) const {
+    walk(0, {0, dag_.root()}, region_level(0), visit);
+  }
+
+  // Makes a region of the finest tier. Thread-safe.
+  MadeRegion make(const PlacedCube& cube) {
+    pages_->check();
+    cancel_.check();
+    const uint32_t level = region_level(0);
+    if (const auto from = copy_source(cube); from != kEncoded)
+      return {copy(*sources_[from], 0, cube.code), from};
+    for (const auto& source : sources_) source->check_values(levels_, level, cube.code);
+    std::vector<ColorCursor> cursors;
+    for (const auto& source : sources_)
+      cursors.emplace_back(source->stored().file(), source->section());
+    return {traits_.is_color() ? encode_colors(cube, cursors) : encode_valued(cube, cursors)};
+  }
+
+  // Must be called for the regions in the order in which they are written.
+  void count_region(uint32_t tier, uint64_t code, size_t copied_from) {
+    if (!traits_.is_color() || tier + 1 == below_.size()) return;
+    const uint64_t parent = code >> 3 * (1 + depth_of(tier + 1));
+    Below& below = below_[tier + 1][parent];
+    ++below.regions;
+    if (copied_from != kEncoded) ++below.copied[copied_from];
+  }
+
+  // Makes a region of a tier above the finest tier. `cells` are the sums of its finest cells.
+  EncodedRegion make_coarse(uint32_t tier, uint64_t code, std::span<const ColoredCell> cells) {
+    const auto open = below_[tier].find(code);
+    const Below below = open->second;
+    below_[tier].erase(open);
+    size_t from = 0;
+    while (from < sources_.size() &&
+           !is_copied_coarse(*sources_[from], below.copied[from], below.regions, tier, code))
+      ++from;
+    const bool is_copied = from < sources_.size();
+    count_region(tier, code, is_copied ? from : kEncoded);
+    if (is_copied) return copy(*sources_[from], tier, code);
+    return encode_region(depth_of(tier), code, cells);
+  }
+
+ private:
+  // Counts the regions in a region of the next coarser tier: all of them, and those that were
+  // copied from each source.
+  struct Below {
+    uint64_t regions = 0;
+    std::array<uint64_t, 2> copied = {};
+  };
+
+  void join_materials() {
+    names_ = sources_[0]->section().names();
+    if (sources_.size() == 1) return;
+    JoinedNames joined = join_names(names_, sources_[1]->section().names());
+    indices_.resize(2);
+    indices_[0].resize(names_.size());
+    std::iota(indices_[0].begin(), indices_[0].end(), 0);
+    names_ = std::move(joined.names);
+    indices_[0].back() = static_cast<uint32_t>(names_.size() - 1);
+    indices_[1] = std::move(joined.b);
+  }
+
+  uint32_t finest_of(uint32_t tier) const { return color_layout::finest_level(levels_, tier); }
+  uint32_t depth_of(uint32_t tier) const { return color_layout::levels_in_region(finest_of(tier)); }
+  uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
+
+  DagView::Children children_of(const DagView& dag, uint32_t level, uint64_t content) const {
+    pages_->visit();
+    return dag.children(level, content);
+  }
+  // Calls visit() for each cube of the level `target` that is inside `cube`, which is on `level`.
+  template <class Visit>
+  void walk(uint32_t level, const PlacedCube& cube, uint32_t target, const Visit& visit) const {
+    if (level == target) return visit(cube);
+    const DagView::Children children = children_of(dag_, level, cube.content);
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i))
+        walk(level + 1,
+             {cube.code << 3 | static_cast<uint64_t>(i), dag_.content(level, children, i)}, target,
+             visit);
+  }
+
+  // True if the regions of the tier are at the places of regions of the source, with the same
+  // levels.
+  bool has_same_regions(const Source& source, uint32_t tier) const {
+    return source.finest() == levels_ && source.is_aligned(region_level(tier)) &&
+           source.file_level(region_level(tier)) >= 0 &&
+           color_layout::levels_in_region(
+               color_layout::finest_level(source.section().color_levels(), tier)) == depth_of(tier);
+  }
+  // Returns the source's cube at `file_code`; nothing if the source has no voxels there.
+  std::optional<uint64_t> content_at(const Source& source, uint32_t file_level,
+                                     uint64_t file_code) const {
+    uint64_t content = source.dag().root();
+    for (uint32_t level = 0; level < file_level; ++level) {
+      const DagView::Children children = children_of(source.dag(), level, content);
+      const int index = static_cast<int>(file_code >> 3 * (file_level - level - 1) & 7);
+      if (!children.has(index)) return std::nullopt;
+      content = source.dag().content(level, children, index);
+    }
+    return content;
+  }
+  // True if a cube of the result and a cube of the source have the same finest cells. `content` and
+  // `file_content` are the two cubes.
+  bool has_same_cells(const Source& source, uint32_t level, uint64_t content,
+                      uint64_t file_content) const {
+    if (level == levels_) return true;
+    const auto file_level = static_cast<uint32_t>(source.file_level(level));
+    if (level + kBrickLevels == result_.grid_levels() && levels_ == result_.grid_levels())
+      return content == file_content;
+    const DagView::Children children = children_of(dag_, level, content);
+    const DagView::Children file_children = children_of(source.dag(), file_level, file_content);
+    if (children.mask != file_children.mask) return false;
+    for (int i = 0; i < 8; ++i)
+      if (children.has(i) && !has_same_cells(source, level + 1, dag_.content(level, children, i),
+                                             source.dag().content(file_level, file_children, i)))
+        return false;
+    return true;
+  }
+  // Returns the index of the source from which the region of the finest tier is copied, or
+  // kEncoded.
+  size_t copy_source(const PlacedCube& cube) const {
+    if (!traits_.is_color()) return kEncoded;
+    const uint32_t level = region_level(0);
+    for (size_t i = 0; i < sources_.size(); ++i) {
+      const Source& source = *sources_[i];
+      if (!source.is_aligned(level)) return kEncoded;
+      const auto file_code = source.file_code(level, cube.code);
+      if (!file_code) continue;
+      const auto file_content =
+          content_at(source, static_cast<uint32_t>(source.file_level(level)), *file_code);
+      if (!file_content) continue;
+      // The source has voxels in the region, so values of the sources after it may not be used.
+      const bool is_same =
+          has_same_regions(source, 0) && has_same_cells(source, level, cube.content, *file_content);
+      return is_same ? i : kEncoded;
+    }
+    return kEncoded;
+  }
+  // True if a region of a tier above the finest tier can be copied from the source, because it has
+  // the same regions in the tier below, and all of them were copied from the source.
+  bool is_copied_coarse(const Source& source, uint64_t copied, uint64_t regions, uint32_t tier,
+                        uint64_t code) const {
+    if (copied != regions || !has_same_regions(source, tier)) return false;
+    const auto file_code = source.file_code(region_level(tier), code);
+    if (!file_code) return false;
+    const voxdag_reader::ColorTier& finer = source.section().tier(tier - 1);
+    const uint32_t bits = 3 * (1 + depth_of(tier));
+    return ColorSection::lower_bound(finer, (*file_code + 1) << bits) -
+               ColorSection::lower_bound(finer, *file_code << bits) ==
+           regions;
+  }
+  EncodedRegion copy(Source& source, uint32_t tier, uint64_t code) const {
+    const uint64_t file_code = *source.file_code(region_level(tier), code);
+    source.check_values(finest_of(tier), region_level(tier), code);
+    return source.stored().copy_region(source.section().tier(tier), file_code, code);
+  }
+
+  // Finds the value of a finest cell. Calls take(source, region, i) with the index of the source,
+  // and the region and index of the value in the source. Calls none() if no source has a value.
+  template <class Take, class None>
+  void find_value(std::vector<ColorCursor>& cursors, uint64_t code, const Take& take,
+                  const None& none) const {
+    for (size_t s = 0; s < sources_.size(); ++s) {
+      uint64_t i = 0;
+      if (const ColorRegion* const region = sources_[s]->find(cursors[s], levels_, code, i))
+        return take(s, *region, i);
+    }
+    none();
+  }
+  [[noreturn]] void no_value(uint64_t code) const {
+    throw Error(ErrorCode::kCorrupt, "the cell of level " + std::to_string(levels_) +
+                                         " with Morton code " + std::to_string(code) +
+                                         " of the result has no " + traits_.name +
+                                         " in the inputs: expected one for each cell");
+  }
+  uint32_t code_in_region(const PlacedCube& cube, uint64_t code) const {
+    return static_cast<uint32_t>(code - (cube.code << 3 * depth_of(0)));
+  }
+
+  EncodedRegion encode_colors(const PlacedCube& cube, std::vector<ColorCursor>& cursors) const {
+    std::vector<ColoredCell> cells;
+    walk(region_level(0), cube, levels_, [&](const PlacedCube& cell) {
+      voxdag_reader::Rgb rgb;
+      find_value(
+          cursors, cell.code,
+          [&](size_t, const ColorRegion& region, uint64_t i) { rgb = region.color(i); },
+          [&] {
+            if (!fill_) no_value(cell.code);
+            rgb = *fill_;
+          });
+      cells.push_back({code_in_region(cube, cell.code), sum_of(rgb, 1)});
+    });
+    return encode_region(depth_of(0), cube.code, cells);
+  }
+  EncodedRegion encode_valued(const PlacedCube& cube, std::vector<ColorCursor>& cursors) const {
+    std::vector<ValuedCell> cells;
+    walk(region_level(0), cube, levels_, [&](const PlacedCube& cell) {
+      find_value(
+          cursors, cell.code,
+          [&](size_t s, const ColorRegion& region, uint64_t i) {
+            uint32_t value = sources_[s]->stored().value(region, i, levels_, cell.code);
+            if (!indices_.empty()) value = indices_[s][value];
+            cells.push_back({code_in_region(cube, cell.code), value});
+          },
+          [&] { no_value(cell.code); });
+    });
+    return encode_values(traits_.attribute, value_bytes(traits_.attribute, names_.size()),
+                         depth_of(0), cube.code, cells);
+  }
+
+  const AttributeTraits& traits_;
+  const voxdag_reader::File& result_;
+  const DagView dag_;
+  const std::optional<voxdag_reader::Rgb> fill_;
+  const CancelToken& cancel_;
+  std::vector<std::unique_ptr<Source>> sources_;  // the first one with a value wins
+  std::unique_ptr<const ResidentPages> pages_;
+  uint32_t levels_ = 0;
+  std::vector<std::string> names_;
+  // By source and by index in the source's list of materials: the index in names_. Empty if there
+  // is only one source.
+  std::vector<std::vector<uint32_t>> indices_;
+  // By tier, for the regions of the tier that are not complete: the regions below them. The key is
+  // the code of the region.
+  std::vector<std::map<uint64_t, Below>> below_;
+};
+
+}  // namespace
+
+void write_combined_attribute(const CombinedFiles& from, const CombinedAttribute& attribute,
+                              FileSystem& files, GlobalFileWriter& out, MemoryBudget& budget,
+                              unsigned threads, Progress& progress, const CancelToken& cancel) {
+  progress.begin_stage(name_of(attribute.attribute), 0, "regions");
+  CombinedColors colors(from, attribute, files, budget, cancel);
+  const RegionMemory memory(budget, attribute.attribute, colors.names().size(), threads);
+  colors.start(budget.limit(), memory.workers());
+  AttributeSectionWriter section(
+      out, attribute.attribute, colors.levels(), colors.names(), budget,
+      [&](uint32_t tier, uint64_t morton, std::span<const ColoredCell> cells) {
+        return colors.make_coarse(tier, morton, cells);
+      });
+  RegionBatches<MadeRegion> regions(
+      memory.workers(), progress, [&](const PlacedCube& cube) { return colors.make(cube); },
+      [&](const MadeRegion& made) {
+        colors.count_region(0, made.region.morton, made.copied_from);
+        section.add_region(made.region);
+      });
+  colors.for_each_region([&](const PlacedCube& cube) { regions.add(cube); });
+  regions.flush();
+  section.finish();
+  colors.release_pages();
+  progress.end_stage();
+}
+
+}  // namespace voxdag::query

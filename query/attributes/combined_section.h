@@ -1,0 +1,65 @@
+// Writes the colors, or another attribute, of a file that combines the voxels of two files
+// (query/combine).
+//
+// A section stores a value for each set cell of the attribute's grid, the *finest cells*, and of
+// all coarser levels. The finest cells of the result have the size of the finest cells of A or of
+// B, whichever are smaller. (A and B are the two files. A file whose values are not used does not
+// count.) A finest cell of the result has
+//
+//   1. A's value, if A has the attribute and a voxel in the cell;
+//   2. otherwise B's value, if B has the attribute and a voxel in the cell;
+//   3. otherwise the fill color.
+//
+// If the finest cells of a file are larger than the cells of the result, the value is the value of
+// the larger cell that contains the cell. If B is moved and its cells do not align with the
+// result's cells, the value is the value of the cell of B that has voxels, has the size of the
+// result's cell, and overlaps it most. On ties, it is the cell with the lowest x, then the lowest
+// y, then z.
+//
+// The color of a coarser cell is the mean, in linear light, of the cell's finest cells. The other
+// attributes have rules for coarser cells (docs/format.md).
+//
+// Colors are stored in color regions of up to 64^3 cells. A color region in which all finest cells
+// have the colors of one file, and which this file stores with the same cells at an aligned place,
+// is copied byte for byte. The other color regions are encoded from decoded colors. The bytes
+// depend only on the contents of the inputs.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "core/base/memory_budget.h"
+#include "core/base/progress.h"
+#include "core/color/attributes.h"
+#include "core/format/global/global_writer.h"
+#include "core/format/global/voxdag_reader.h"
+#include "core/io/file_system.h"
+#include "voxdag/cancel_token.h"
+
+namespace voxdag::query {
+
+// An attribute of the result, and the files from which it takes values: at least one file, which
+// must have the attribute.
+struct CombinedAttribute {
+  Attribute attribute;
+  bool from_a = false, from_b = false;
+};
+
+struct CombinedFiles {
+  const voxdag_reader::File& result;  // has the voxels of the result; not empty
+  const voxdag_reader::File& a;
+  const voxdag_reader::File& b;  // as it was given, not moved
+  // The voxel of the result's grid at which B's voxel (0, 0, 0) is placed.
+  std::array<int64_t, 3> offset = {};
+  std::optional<voxdag_reader::Rgb> fill;
+};
+
+// Writes the attribute to `out`, in which the levels must be complete. Throws Error{kCorrupt} for a
+// damaged file, Error{kLimit} for too many materials, Error{kOutOfMemory}, Error{kCanceled} and
+// voxdag_reader::Error.
+void write_combined_attribute(const CombinedFiles& from, const CombinedAttribute& attribute,
+                              FileSystem& files, GlobalFileWriter& out, MemoryBudget& budget,
+                              unsigned threads, Progress& progress, const CancelToken& cancel);
+
+}  // namespace voxdag::query

@@ -1,0 +1,396 @@
+// Compares the colors and other values of combined files with values that are computed voxel by
+// voxel from the scenes. Code written from docs/format.md decodes the combined files.
+#include <cmath>
+#include <optional>
+
+#include "core/color/color_of.h"
+#include "tests/support/error_of.h"
+#include "tests/unit/core/format/color/valued_files.h"
+#include "tests/unit/query/combine/combine_fixture.h"
+
+namespace voxdag::query {
+namespace {
+
+using Position = std::array<int64_t, 3>;
+
+Position position_of(uint64_t code) {
+  uint32_t x, y, z;
+  morton_decode(code, x, y, z);
+  return {x, y, z};
+}
+uint64_t code_of(const Position& at) {
+  return morton_encode(static_cast<uint32_t>(at[0]), static_cast<uint32_t>(at[1]),
+                       static_cast<uint32_t>(at[2]));
+}
+double linear_of(int stored) {
+  const double s = stored / 255.0;
+  return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+}
+double stored_of(double linear) {
+  return 255 * (linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055);
+}
+
+// Each cell has one of two grays. The grays of the two files differ. Color blocks encode all four
+// grays well.
+constexpr int kGrays[2][2] = {{0, 85}, {170, 255}};
+constexpr int kTolerance = 40;
+int gray_of(size_t file, uint64_t code) { return kGrays[file][oracle::Random(code).between(0, 1)]; }
+SumOf grays(size_t file) {
+  return [=](uint64_t code) {
+    const uint64_t gray = color::intensity_of(static_cast<uint8_t>(gray_of(file, code)));
+    ColorSum sum;
+    sum.plain = sum.seen = {gray, gray, gray};
+    sum.weight = sum.seen_weight = 1;
+    return sum;
+  };
+}
+
+class CombineColors : public Combine {
+ protected:
+  // Writes the files a and b, whose voxels have the edge 1. Every second walk of b's voxels is in
+  // a, so that the files share voxels.
+  void write(uint32_t levels_a, uint32_t color_a, uint32_t levels_b, uint32_t color_b,
+             int count = 1500) {
+    scenes_[0] = {levels_a, color_a, random_codes(21, levels_a, count), grays(0)};
+    scenes_[1] = {levels_b, color_b, random_codes(22, levels_b, count), grays(1)};
+    if (levels_a == levels_b)
+      for (const uint64_t code : random_codes(23, levels_a, count))
+        for (ColoredScene& scene : scenes_) scene.voxels.push_back(code);
+    for (ColoredScene& scene : scenes_) {
+      std::sort(scene.voxels.begin(), scene.voxels.end());
+      const auto end = std::unique(scene.voxels.begin(), scene.voxels.end());
+      scene.voxels.erase(end, scene.voxels.end());
+    }
+    write_file(0, true);
+    write_file(1, true);
+  }
+  static std::string name(size_t file) { return file == 0 ? "a" : "b"; }
+  void write_file(size_t file, bool with_colors) const {
+    const ColoredScene& scene = scenes_[file];
+    const oracle::Dag dag = sparse_dag(scene.voxels, scene.levels);
+    GlobalFileWriter writer(
+        system_files(), path(name(file)),
+        Grid::given({0, 0, 0}, static_cast<double>(1 << scene.levels), scene.levels), 64);
+    write_levels(writer, dag, scene.levels);
+    if (with_colors) write_colors(writer, scene);
+    writer.finish({dag.voxels, dag.svo_nodes});
+  }
+
+  // Returns the voxels of the result, in the grid of a.
+  Codes result_voxels(const CombineSpec& spec) const {
+    const Position offset = spec.offset.value_or(Position{});
+    const int64_t edge = int64_t{1} << scenes_[0].levels;
+    std::map<uint64_t, int> files;  // bit f: the voxel is in file f
+    for (const uint64_t code : scenes_[0].voxels) files[code] |= 1;
+    for (const uint64_t code : scenes_[1].voxels) {
+      Position at = position_of(code);
+      bool is_inside = true;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        at[axis] += offset[axis];
+        is_inside = is_inside && at[axis] >= 0 && at[axis] < edge;
+      }
+      if (is_inside) files[code_of(at)] |= 2;
+    }
+    Codes voxels;
+    for (const auto& [code, in] : files) {
+      const bool a = in & 1, b = in & 2;
+      const bool is_set[] = {a || b, a && !b, a && b, a != b};
+      if (is_set[static_cast<int>(spec.operation)]) voxels.push_back(code);
+    }
+    return voxels;
+  }
+
+  // Returns the code of the cell of b's color grid from which the result's cell at `code` takes its
+  // color; nothing if b has no voxel in the cell. The result has cells of `edge` voxels.
+  std::optional<uint64_t> color_cell_of_b(uint64_t code, int64_t edge, const Position& offset) {
+    const ColoredScene& b = scenes_[1];
+    if (cells_of_b_.empty())
+      for (const uint64_t voxel : b.voxels) {
+        const Position at = position_of(voxel);
+        cells_of_b_.insert({at[0] / edge, at[1] / edge, at[2] / edge});
+      }
+    const Position low = position_of(code);
+    int64_t largest = 0;
+    Position best = {};
+    for (const Position& cell : cells_of_b_) {  // in the order of x, y and z
+      int64_t overlap = 1;
+      for (size_t axis = 0; axis < 3; ++axis) {
+        const int64_t begin = cell[axis] * edge + offset[axis];
+        const int64_t common =
+            std::min(begin, low[axis] * edge) + edge - std::max(begin, low[axis] * edge);
+        overlap *= std::max<int64_t>(common, 0);
+      }
+      if (overlap > largest) {
+        largest = overlap;
+        best = cell;
+      }
+    }
+    if (largest == 0) return std::nullopt;
+    const int64_t color_edge = int64_t{1} << (b.levels - b.color_levels);
+    for (int64_t& i : best) i = i * edge / color_edge;
+    return code_of(best);
+  }
+
+  // Combines the files, and compares the color of each cell of each level. `fill` is the gray of
+  // cells without a color; `has_color` tells which files have colors.
+  void check(const CombineSpec& spec, uint32_t color_levels,
+             std::array<bool, 2> has_color = {true, true}, int fill = -1) {
+    SCOPED_TRACE(testing::Message() << "operation " << static_cast<int>(spec.operation)
+                                    << ", color levels " << color_levels);
+    const ColoredScene& a = scenes_[0];
+    const ColoredScene result{a.levels, color_levels, result_voxels(spec), {}};
+    ASSERT_FALSE(result.voxels.empty());
+    combine_files("a", "b", spec);
+    const std::string written = bytes("c");
+    const SectionDecoder decoder(written, result);
+    const int64_t edge = int64_t{1} << (a.levels - color_levels);
+    std::set<uint64_t> cells_of_a;
+    for (const uint64_t voxel : a.voxels) cells_of_a.insert(voxel >> 3 * (a.levels - color_levels));
+    cells_of_b_.clear();
+    // By level and cell: the sum of the linear intensities of the finest cells, and their number.
+    std::map<std::pair<uint32_t, uint64_t>, std::pair<double, double>> means;
+    for (const uint64_t code : result.cells(color_levels)) {
+      int gray = fill;
+      if (has_color[0] && cells_of_a.contains(code)) {
+        const uint32_t up = color_levels - std::min(color_levels, a.color_levels);
+        gray = gray_of(0, code >> 3 * up);
+        ++from_a_;
+      } else if (const auto cell =
+                     has_color[1] ? color_cell_of_b(code, edge, spec.offset.value_or(Position{}))
+                                  : std::nullopt) {
+        gray = gray_of(1, *cell);
+        ++from_b_;
+      }
+      ASSERT_GE(gray, 0);
+      for (uint32_t level = 0; level <= color_levels; ++level) {
+        auto& [sum, count] = means[{level, code >> 3 * (color_levels - level)}];
+        sum += linear_of(gray);
+        count += 1;
+      }
+    }
+    ASSERT_EQ(means.size(), decoder.colors().size());
+    for (const auto& [place, mean] : means)
+      for (const int channel : decoder.colors().at(place))
+        ASSERT_NEAR(channel, stored_of(mean.first / mean.second), kTolerance)
+            << place.first << " " << place.second;
+  }
+
+  ColoredScene scenes_[2];
+  std::set<Position> cells_of_b_;
+  size_t from_a_ = 0, from_b_ = 0;
+};
+
+TEST_F(CombineColors, AllOperations) {
+  for (const auto& [levels, color_a, color_b] :
+       {std::array{6u, 6u, 6u}, {7u, 5u, 5u}, {6u, 4u, 6u}, {7u, 7u, 3u}, {8u, 8u, 8u}}) {
+    write(levels, color_a, levels, color_b, 700);
+    const uint32_t finer = std::max(color_a, color_b);
+    check(spec(Operation::kUnion, "c"), finer);
+    check(spec(Operation::kXor, "c"), finer);
+    check(spec(Operation::kMinus, "c"), color_a);
+    check(spec(Operation::kAnd, "c"), color_a);
+  }
+  EXPECT_GT(from_a_, 1000u);
+  EXPECT_GT(from_b_, 1000u);
+}
+
+// The moved file has another resolution. Its cells align with the cells of the result, or not.
+TEST_F(CombineColors, Offset) {
+  for (const auto& [color_a, levels_b, color_b] :
+       {std::array{6u, 6u, 6u}, {6u, 5u, 3u}, {3u, 6u, 4u}, {4u, 7u, 2u}, {2u, 8u, 3u}}) {
+    SCOPED_TRACE(testing::Message() << color_a << " " << levels_b << " " << color_b);
+    write(6, color_a, levels_b, color_b, 300);
+    const int of_b = static_cast<int>(color_b) + 6 - static_cast<int>(levels_b);
+    const auto finer = static_cast<uint32_t>(std::max({static_cast<int>(color_a), of_b, 2}));
+    for (const Position& offset : {Position{8, -16, 0}, {1, 2, 3}, {-5, 7, 10}}) {
+      CombineSpec moved = spec(Operation::kUnion, "c");
+      moved.offset = offset;
+      moved.clip = true;
+      check(moved, finer);
+      moved.operation = Operation::kXor;
+      check(moved, finer);
+    }
+  }
+  EXPECT_GT(from_b_, 500u);
+}
+
+// Results with the cells of one input have this input's bytes. The files have up to three tiers.
+TEST_F(CombineColors, EqualVoxelsAreTheSameBytes) {
+  for (const auto& [levels, color_levels] : {std::pair{9u, 9u}, {8u, 7u}, {16u, 15u}}) {
+    SCOPED_TRACE(levels);
+    write(levels, color_levels, levels, color_levels, 2000);
+    const std::string a = bytes("a");
+    EXPECT_TRUE(combined("a", Operation::kUnion, "a", "c") == a);
+    EXPECT_TRUE(combined("a", Operation::kAnd, "a", "c") == a);
+    EXPECT_EQ(combine_files("b", "b", spec(Operation::kXor, "none")).voxels, 0u);
+    EXPECT_TRUE(combined("none", Operation::kUnion, "a", "c") == a);
+    EXPECT_TRUE(combined("a", Operation::kXor, "none", "c") == a);
+    EXPECT_TRUE(combined("a", Operation::kMinus, "none", "c") == a);
+    const auto file = open_global_file(path("a"));
+    const Shape nothing("box:0,0,0,1,1,1");
+    ASSERT_NE(scenes_[0].voxels[0], 0u);
+    cut(*file, nothing, spec(Operation::kMinus, "c"), system_files(), warnings_, never_);
+    EXPECT_TRUE(bytes("c") == a);
+  }
+}
+
+// Regions that the operation does not change keep their bytes; the other regions are encoded again.
+TEST_F(CombineColors, UnchangedRegionsAreCopied) {
+  scenes_[0] = {9, 9, random_codes(31, 9, 6000), smooth_colors(9, 20)};
+  write_file(0, true);
+  const std::string a = bytes("a");
+  const auto file = open_global_file(path("a"));
+  cut(*file, Shape("box:3,3,3,250,130,512"), spec(Operation::kMinus, "c"), system_files(),
+      warnings_, never_);
+  ColoredScene rest = scenes_[0];
+  std::erase_if(rest.voxels, [](uint64_t code) {
+    const Position at = position_of(code);
+    return at[0] >= 3 && at[0] < 250 && at[1] >= 3 && at[1] < 130 && at[2] >= 3 && at[2] < 512;
+  });
+  ASSERT_LT(rest.voxels.size(), scenes_[0].voxels.size());
+  const std::string c = bytes("c");
+  const SectionDecoder before(a, scenes_[0]), after(c, rest);
+  size_t equal = 0, near = 0;
+  for (const auto& [place, color] : after.colors()) {
+    const auto& old = before.colors().at(place);
+    const Position region = position_of(place.second >> 3 * (std::max(place.first, 3u) - 3));
+    if (place.first >= 3 && (region[0] >= 4 || region[1] >= 3)) {
+      ASSERT_EQ(color, old);
+      ++equal;
+    } else if (place.first == 9) {
+      for (size_t i = 0; i < 3; ++i) ASSERT_NEAR(color[i], old[i], kTolerance);
+      ++near;
+    }
+  }
+  EXPECT_GT(equal, 1000u);
+  EXPECT_GT(near, 50u);
+}
+
+TEST_F(CombineColors, OneFileHasColors) {
+  write(6, 6, 6, 5);
+  CombineSpec filled = spec(Operation::kUnion, "c");
+  filled.fill_color = voxdag_reader::Rgb{255, 255, 255};
+  write_file(1, false);
+  check(filled, 6, {true, false}, 255);
+  const auto message = [&](const std::string& a, const std::string& b, Operation operation) {
+    const auto file_a = open_global_file(path(a)), file_b = open_global_file(path(b));
+    const Error error = error_of([&] {
+      combine(*file_a, *file_b, spec(operation, "x"), system_files(), warnings_, never_);
+    });
+    EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+    return error.message();
+  };
+  const std::string expected =
+      path("a") + " has colors and " + path("b") +
+      " has none: expected colors in both files, --fill-color with a color for " + path("b") +
+      ", or --no-attributes to combine only the voxels";
+  EXPECT_EQ(message("a", "b", Operation::kUnion), expected);
+  EXPECT_EQ(message("b", "a", Operation::kXor), expected);
+  EXPECT_FALSE(std::filesystem::exists(path("x")));
+  // These two operations need only the colors of a.
+  check(spec(Operation::kMinus, "c"), 6, {true, false});
+  check(spec(Operation::kAnd, "c"), 6, {true, false});
+  write_file(0, false);
+  const std::string voxels = combined("a", Operation::kUnion, "b", "c");
+  write_file(1, true);
+  filled.operation = Operation::kXor;
+  check(filled, 5, {false, true}, 255);
+  check(spec(Operation::kAnd, "c"), 5, {false, true});
+  combine_files("a", "b", spec(Operation::kMinus, "c"));
+  EXPECT_FALSE(open_global_file(path("c"))->has_colors());
+  CombineSpec plain = spec(Operation::kUnion, "c");
+  plain.attributes = false;
+  combine_files("a", "b", plain);
+  EXPECT_TRUE(bytes("c") == voxels);
+}
+
+TEST_F(CombineColors, MemoryAndThreadsDoNotMatter) {
+  write(9, 9, 9, 9, 3000);
+  CombineSpec one = spec(Operation::kXor, "one"), many = spec(Operation::kXor, "many");
+  one.list_bytes = 256;
+  many.threads = 5;
+  many.memory_bytes = uint64_t{1} << 30;
+  combine_files("a", "b", one);
+  combine_files("a", "b", many);
+  EXPECT_TRUE(bytes("one") == bytes("many"));
+}
+
+// Alpha, normals and materials have the values of a where a has a voxel, and otherwise those of b.
+TEST_F(CombineColors, OtherAttributes) {
+  constexpr size_t kMaterials[2] = {7, 300};
+  for (const auto& [color_a, color_b] : {std::pair{8u, 8u}, {7u, 6u}}) {
+    write(8, color_a, 8, color_b);
+    for (size_t f = 0; f < 2; ++f)
+      write_valued(path(name(f)), scenes_[f], AttributeSet::all(), kMaterials[f]);
+    for (const Operation operation : kAllOperations) {
+      const CombineSpec combined = spec(operation, "c");
+      const bool is_joined = operation == Operation::kUnion || operation == Operation::kXor;
+      const ColoredScene result{
+          8, is_joined ? std::max(color_a, color_b) : color_a, result_voxels(combined), {}};
+      combine_files("a", "b", combined);
+      std::set<uint64_t> cells_of_a;
+      for (const uint64_t code : scenes_[0].cells(result.color_levels)) cells_of_a.insert(code);
+      const std::string written = bytes("c");
+      for (size_t i = 0; i < 3; ++i) {
+        const auto kind = static_cast<uint32_t>(i + 2);
+        const auto attribute = static_cast<Attribute>(kind);
+        // The joined list has 300 names, because all names of a are also names of b.
+        const uint64_t width = i == 0 || (i == 2 && !is_joined) ? 1 : 2;
+        const ValueDecoder decoder(written, result, i + 1, kind, width);
+        if (i == 2) {
+          EXPECT_EQ(decoder.names().size(), is_joined ? kMaterials[1] : kMaterials[0]);
+        }
+        for (const uint64_t code : result.cells(result.color_levels)) {
+          const size_t from = cells_of_a.contains(code) ? 0 : 1;
+          const uint32_t up = result.color_levels - scenes_[from].color_levels;
+          const uint64_t expected = value_of_code(attribute, code >> 3 * up, kMaterials[from]);
+          const uint64_t found = decoder.values().at({result.color_levels, code});
+          if (i < 2) {
+            ASSERT_EQ(found, expected);
+          } else {
+            ASSERT_EQ(decoder.names()[found], names_of_materials(kMaterials[from])[expected]);
+          }
+        }
+      }
+    }
+  }
+  write_valued(path("a"), scenes_[0], {Attribute::kColor, Attribute::kNormal});
+  const auto file_a = open_global_file(path("a")), file_b = open_global_file(path("b"));
+  const Error error = error_of([&] {
+    combine(*file_a, *file_b, spec(Operation::kUnion, "x"), system_files(), warnings_, never_);
+  });
+  EXPECT_EQ(error.message(), path("b") + " has alphas and " + path("a") +
+                                 " has none: expected alphas in both files, or --no-attributes to "
+                                 "combine only the voxels");
+}
+
+// Damage in the colors of either file, and in their directory, is found. No file remains.
+TEST_F(CombineColors, DamageIsFound) {
+  write(8, 8, 8, 8);
+  for (const char* const damaged_file : {"a", "b"}) {
+    const std::string intact = bytes(damaged_file);
+    std::vector<uint64_t> places;
+    {
+      const auto file = open_global_file(path(damaged_file));
+      const auto& tier = file->colors().tier(0);
+      places = {static_cast<uint64_t>(tier.data - file->data()) + 8 * tier.units,
+                static_cast<uint64_t>(tier.directory - file->data()) + 40};
+    }
+    for (const uint64_t place : places) {
+      std::string damaged = intact;
+      damaged[place] = static_cast<char>(damaged[place] ^ 4);
+      write_bytes(path(damaged_file), damaged);
+      const auto file_a = open_global_file(path("a")), file_b = open_global_file(path("b"));
+      const Error error = error_of([&] {
+        combine(*file_a, *file_b, spec(Operation::kUnion, "c"), system_files(), warnings_, never_);
+      });
+      EXPECT_EQ(error.code(), ErrorCode::kCorrupt);
+      EXPECT_NE(error.message().find(path(damaged_file)), std::string::npos) << error.message();
+      expect_files({"a", "b"});
+    }
+    write_bytes(path(damaged_file), intact);
+  }
+}
+
+}  // namespace
+}  // namespace voxdag::query
