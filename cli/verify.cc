@@ -153,8 +153,9 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.path);
   const auto progress = make_progress_bar(command.quiet);
   MemoryBudget budget(~uint64_t{0});
+  PageLimit pages(*file, memory_limit(command.memory));
   verify_global_file(*file, command.threads, budget, *progress, context.cancel,
-                     global_layout::kNarrowLevelWords, command.quick);
+                     global_layout::kNarrowLevelWords, command.quick, &pages);
   std::optional<Sample> sample;
   if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
   if (command.json)
@@ -169,7 +170,8 @@ void declare(Command& command, VerifyCommand& state) {
                  "compare a sample of voxels, and of colors, with the triangles of this scene");
   command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
   command.option("--memory", state.memory,
-                 "memory for the scene of --against; default: half the RAM");
+                 "memory for the scene of --against, and limit above which pages of the file are "
+                 "dropped from memory; default: half the RAM");
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");
   command.option("--cutouts", state.cutouts, "skip or keep, as in the build")

@@ -4,6 +4,7 @@
 #include "core/base/parallel_for.h"
 #include "core/base/popcount8.h"
 #include "core/format/global/global_layout.h"
+#include "core/format/global/page_limit.h"
 
 namespace voxdag {
 namespace {
@@ -82,7 +83,8 @@ uint64_t NodeIndex::join(std::span<Span> spans, const CancelToken& cancel,
 }
 
 NodeIndex::NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
-                     MemoryBudget& budget, const CancelToken& cancel, const std::string& where)
+                     MemoryBudget& budget, const CancelToken& cancel, const std::string& where,
+                     PageLimit* pages)
     : level_(level), pointers_(pointers) {
   const auto miscounted = [&](uint64_t nodes) {
     throw Error(ErrorCode::kCorrupt, where + ": its words hold " + std::to_string(nodes) +
@@ -97,6 +99,7 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsig
   parallel_for(threads, spans.size(), [&](unsigned, size_t span) {
     cancel.check();
     spans[span] = walk(span, guess_begin(span));
+    if (pages) pages->touch(sizeof(uint32_t) * kSpanWords);
   });
   const uint64_t nodes = join({spans.data(), spans.size()}, cancel, where);
   if (nodes != level.node_count) miscounted(nodes);

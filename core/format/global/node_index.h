@@ -22,6 +22,8 @@
 
 namespace voxdag {
 
+class PageLimit;
+
 // The kind of child pointers in the nodes of a level. Bricks have none.
 enum class Pointers { kNone, kNarrow, kWide };
 
@@ -30,6 +32,7 @@ enum class Pointers { kNone, kNarrow, kWide };
 class NodeIndex {
  public:
   static constexpr uint64_t kNone = ~uint64_t{0};
+  static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
 
   // Describes 64 words of the level.
   struct Words {
@@ -61,9 +64,11 @@ class NodeIndex {
   NodeIndex() = default;
   // Walks the words of the level on up to `threads` threads. Throws Error{kCorrupt} unless every
   // child mask is 1 to 255, the last node ends with the level, and the level has as many nodes as
-  // the header says. The message begins with `where`.
+  // the header says. The message begins with `where`. Reports to `pages`, if it is not null, the
+  // bytes that were read.
   NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
-            MemoryBudget& budget, const CancelToken& cancel, const std::string& where);
+            MemoryBudget& budget, const CancelToken& cancel, const std::string& where,
+            PageLimit* pages = nullptr);
 
   // Returns the index of the node that begins at `offset`; kNone if no node begins there.
   uint64_t find(uint64_t offset) const { return lookup().find(offset); }
@@ -90,8 +95,6 @@ class NodeIndex {
   uint64_t last_before(uint64_t span) const;
 
  private:
-  static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
-
   struct Span {
     uint64_t begin = 0;  // word offset of its first node
     uint64_t end = 0;    // word offset of the end of its last node

@@ -26,21 +26,23 @@ constexpr uint64_t kBlocksPerItem = 64;  // checksum blocks, 4 MiB together
 class Verifier {
  public:
   Verifier(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-           Progress& progress, const CancelToken& cancel, uint64_t narrow_words, bool is_quick)
+           Progress& progress, const CancelToken& cancel, uint64_t narrow_words, bool is_quick,
+           PageLimit& pages)
       : file_(file),
         threads_(threads),
         budget_(budget),
         progress_(progress),
         cancel_(cancel),
         narrow_words_(narrow_words),
-        is_quick_(is_quick) {}
+        is_quick_(is_quick),
+        pages_(pages) {}
 
   void run() {
     check_header();
     check_blocks();
     check_padding();
-    verify_nodes(file_, threads_, budget_, progress_, cancel_, is_quick_);
-    verify_colors(file_, threads_, progress_, cancel_);
+    verify_nodes(file_, threads_, budget_, progress_, cancel_, is_quick_, pages_);
+    verify_colors(file_, threads_, progress_, cancel_, pages_);
   }
 
  private:
@@ -65,6 +67,7 @@ class Verifier {
   const CancelToken& cancel_;
   const uint64_t narrow_words_;
   const bool is_quick_;
+  PageLimit& pages_;
 };
 
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
@@ -178,14 +181,17 @@ void Verifier::check_blocks() {
   const CheckedBlocks checked(file_);
   const uint64_t blocks = checked.count();
   progress_.begin_stage("verify checksums", bytes, "bytes");
-  parallel_for(
-      threads_, (blocks + kBlocksPerItem - 1) / kBlocksPerItem, [&](unsigned, size_t item) {
-        const uint64_t first = item * kBlocksPerItem;
-        const uint64_t end = std::min(first + kBlocksPerItem, blocks);
-        for (uint64_t block = first; block < end; ++block) checked.compare(block);
-        progress_.advance(std::min(end * kChecksumBlockBytes, bytes) - first * kChecksumBlockBytes);
-        cancel_.check();
-      });
+  parallel_for(threads_, (blocks + kBlocksPerItem - 1) / kBlocksPerItem,
+               [&](unsigned, size_t item) {
+                 const uint64_t first = item * kBlocksPerItem;
+                 const uint64_t end = std::min(first + kBlocksPerItem, blocks);
+                 for (uint64_t block = first; block < end; ++block) checked.compare(block);
+                 const uint64_t read =
+                     std::min(end * kChecksumBlockBytes, bytes) - first * kChecksumBlockBytes;
+                 progress_.advance(read);
+                 pages_.touch(read);
+                 cancel_.check();
+               });
   progress_.end_stage();
 }
 
@@ -202,8 +208,11 @@ void Verifier::check_padding() const {
 
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel, uint64_t narrow_words,
-                        bool is_quick) {
-  Verifier(file, threads, budget, progress, cancel, narrow_words, is_quick).run();
+                        bool is_quick, PageLimit* pages) {
+  PageLimit unlimited(file, ~uint64_t{0});
+  Verifier(file, threads, budget, progress, cancel, narrow_words, is_quick,
+           pages ? *pages : unlimited)
+      .run();
 }
 
 }  // namespace voxdag

@@ -68,6 +68,10 @@ constexpr const char* kBrokenEntry =
     "a count of cells or the offset of its data is out of range: expected at most the cells of the "
     "region's cube, and data within the section";
 
+// Estimate of the bytes that a region reads. The nodes of its cells are at random places, and the
+// system loads up to 64 KiB at each of them.
+constexpr uint64_t kReadBytesPerRegion = uint64_t{1} << 20;
+
 class ColorVerifier {
  public:
   ColorVerifier(const voxdag_reader::File& file, Attribute attribute)
@@ -228,7 +232,7 @@ class ColorVerifier {
 };
 
 void verify_section(const voxdag_reader::File& file, Attribute attribute, unsigned threads,
-                    Progress& progress, const CancelToken& cancel) {
+                    Progress& progress, const CancelToken& cancel, PageLimit& pages) {
   const ColorVerifier verifier(file, attribute);
   const ColorSection& section = section_of(file, attribute);
   for (uint32_t t = 0; t < section.tier_count(); ++t) {
@@ -264,6 +268,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
                           " of 16 bytes: expected " + std::to_string(tier.units) +
                           ", the end of the tier, because it is the last region");
       cells += region.cells;
+      pages.touch(kReadBytesPerRegion);
       progress.advance(1);
     });
     if (cells != tier.cell_count)
@@ -276,10 +281,10 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
 }  // namespace
 
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
-                   const CancelToken& cancel) {
+                   const CancelToken& cancel, PageLimit& pages) {
   with_reader_errors([&] {
     for (const AttributeTraits& row : kAttributeTable)
-      verify_section(file, row.attribute, threads, progress, cancel);
+      verify_section(file, row.attribute, threads, progress, cancel, pages);
   });
 }
 

@@ -10,6 +10,7 @@
 #pragma once
 
 #include "core/base/progress.h"
+#include "core/format/global/page_limit.h"
 #include "core/format/global/voxdag_reader.h"
 #include "voxdag/cancel_token.h"
 
@@ -18,6 +19,6 @@ namespace voxdag {
 // Checks the sections on up to `threads` threads. Throws Error{kCorrupt}; the message names the
 // problem, its place and the expected value. A file without attributes is valid.
 void verify_colors(const voxdag_reader::File& file, unsigned threads, Progress& progress,
-                   const CancelToken& cancel);
+                   const CancelToken& cancel, PageLimit& pages);
 
 }  // namespace voxdag

@@ -31,13 +31,14 @@ struct CheckedLevel {
 class NodeVerifier {
  public:
   NodeVerifier(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-               Progress& progress, const CancelToken& cancel, bool is_quick)
+               Progress& progress, const CancelToken& cancel, bool is_quick, PageLimit& pages)
       : file_(file),
         threads_(threads),
         budget_(budget),
         progress_(progress),
         cancel_(cancel),
         is_quick_(is_quick),
+        pages_(pages),
         orphans_(file.brick_level() + 1, NodeIndex::kNone) {}
 
   // Returns the values of the root.
@@ -74,6 +75,7 @@ class NodeVerifier {
   Progress& progress_;
   const CancelToken& cancel_;
   const bool is_quick_;
+  PageLimit& pages_;
   const ComputeBatch compute_batch_ = compute_batch();
   CheckedLevel below_;             // the level checked last
   std::vector<uint64_t> orphans_;  // index of each level's first node without a parent, or kNone
@@ -199,16 +201,18 @@ uint64_t NodeVerifier::first_orphan() const {
 
 void NodeVerifier::check_level(uint32_t level) {
   const voxdag_reader::Level& words = file_.level(level);
-  CheckedLevel checked{level,
-                       NodeIndex(words, pointers(level), threads_, budget_, cancel_, where(level)),
-                       SubtreeTable(budget_, words.node_count, file_.grid_levels() - level)};
+  CheckedLevel checked{
+      level, NodeIndex(words, pointers(level), threads_, budget_, cancel_, where(level), &pages_),
+      SubtreeTable(budget_, words.node_count, file_.grid_levels() - level)};
   parallel_for(threads_, checked.index.span_count(), [&](unsigned, size_t span) {
     cancel_.check();
     const bool are_bricks = level == file_.brick_level();
     progress_.advance(are_bricks ? check_bricks(checked, span) : check_nodes(checked, span));
+    pages_.touch(sizeof(uint32_t) * NodeIndex::kSpanWords);
   });
   if (!is_by_hash()) {
-    if (level < file_.brick_level()) expect_first_parents(file_, level, checked.index, cancel_);
+    if (level < file_.brick_level())
+      expect_first_parents(file_, level, checked.index, cancel_, pages_);
     if (!is_quick_)
       expect_unique({file_, level, checked.index, checked.table}, threads_, budget_, cancel_);
   }
@@ -232,10 +236,10 @@ Subtree NodeVerifier::check_levels() {
 }  // namespace
 
 void verify_nodes(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-                  Progress& progress, const CancelToken& cancel, bool is_quick) {
+                  Progress& progress, const CancelToken& cancel, bool is_quick, PageLimit& pages) {
   Subtree root;
   if (!file.empty())
-    root = NodeVerifier(file, threads, budget, progress, cancel, is_quick).check_levels();
+    root = NodeVerifier(file, threads, budget, progress, cancel, is_quick, pages).check_levels();
   const std::string header = file.path() + ": header: ";
   if (root.voxels != file.voxels())
     throw Error(ErrorCode::kCorrupt, header + std::to_string(file.voxels()) +

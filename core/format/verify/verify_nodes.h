@@ -5,6 +5,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
+#include "core/format/global/page_limit.h"
 #include "core/format/global/voxdag_reader.h"
 #include "voxdag/cancel_token.h"
 
@@ -12,6 +13,6 @@ namespace voxdag {
 
 // Throws Error{kCorrupt} if a rule is broken. `is_quick` is explained at verify_global_file().
 void verify_nodes(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-                  Progress& progress, const CancelToken& cancel, bool is_quick);
+                  Progress& progress, const CancelToken& cancel, bool is_quick, PageLimit& pages);
 
 }  // namespace voxdag

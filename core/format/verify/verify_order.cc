@@ -72,7 +72,7 @@ bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, u
 }
 
 void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
-                          const CancelToken& cancel) {
+                          const CancelToken& cancel, PageLimit& pages) {
   const bool has_bricks = level + 1 == file.brick_level();
   uint64_t next = 0;  // word of the first node that no pointer has referred to yet
   const auto pass = [&](uint64_t at, const voxdag_reader::Node& node, int c) {
@@ -93,10 +93,12 @@ void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const
   };
   for (uint64_t span = 0; span < index.span_count(); ++span) {
     cancel.check();
+    const uint64_t first = next;
     index.visit_span(span, [&](uint64_t, uint64_t at) {
       const voxdag_reader::Node node = verified_node(file, level, at);
       for (int c = 0; c < kPopcount8[node.child_mask]; ++c) pass(at, node, c);
     });
+    pages.touch(sizeof(uint32_t) * (NodeIndex::kSpanWords + next - first));
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/base/memory_budget.h"
 #include "core/format/global/node_index.h"
+#include "core/format/global/page_limit.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/format/verify/subtree_table.h"
 #include "voxdag/cancel_token.h"
@@ -28,7 +29,7 @@ bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, u
 // pointer in `level` refers to a node to which an earlier pointer refers, or to the node that
 // follows the last of these nodes. `index` is the index of `level`. Throws Error{kCorrupt}.
 void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
-                          const CancelToken& cancel);
+                          const CancelToken& cancel, PageLimit& pages);
 
 // A level, and a table with the truncated hashes of its nodes.
 struct HashedLevel {

@@ -103,6 +103,22 @@ TEST_F(VerifyTest, TrailingBytesAreCaught) {
   }
 }
 
+// Every pass over the file reports the bytes that it read: checksums, index and nodes. Pages that
+// are dropped in the middle are read again.
+TEST_F(VerifyTest, PagesAreDroppedAboveTheLimit) {
+  write_global(path_, random_voxels(5, 128));
+  const auto file = open_global_file(path_);
+  uint64_t node_bytes = 0;
+  for (uint32_t level = 0; level <= file->brick_level(); ++level)
+    node_bytes += sizeof(uint32_t) * file->level(level).word_count;
+  MemoryBudget budget(uint64_t{1} << 30);
+  NoProgress progress;
+  PageLimit pages(*file, 0, kPageBytes);
+  EXPECT_NO_THROW(
+      verify_global_file(*file, 3, budget, progress, {}, kNarrowLevelWords, false, &pages));
+  EXPECT_GE(pages.touched_bytes(), 3 * node_bytes);
+}
+
 // The error names the damaged block in the middle of a large file.
 TEST_F(VerifyTest, DamagedBlockIsNamed) {
   oracle::Random random(1);
