@@ -170,12 +170,12 @@ SqlDatabase::SqlDatabase(const std::string& path, Mode mode, int busy_ms) {
   sqlite3_busy_timeout(database, busy_ms);
 }
 
-SqlDatabase SqlDatabase::in_memory() {
+SqlDatabase SqlDatabase::in_memory(const std::string& path) {
   SqlDatabase database;
   sqlite3* handle = nullptr;
   const int result = sqlite3_open(":memory:", &handle);
   database.handle_.reset(handle);
-  if (result != SQLITE_OK) fail(handle, result, "in memory");
+  if (result != SQLITE_OK) fail(handle, result, path + " (in memory)");
   return database;
 }
 

@@ -61,8 +61,9 @@ class SqlDatabase {
   // milliseconds if another process has locked the database. Throws Error{kInvalidInput} if `path`
   // is a symbolic link or anything else that is not a regular file.
   SqlDatabase(const std::string& path, Mode mode, int busy_ms = 5000);
-  // Opens a new, empty database in memory.
-  static SqlDatabase in_memory();
+  // Opens a new, empty database in memory. `path` is the file to which it will be copied; errors
+  // name it.
+  static SqlDatabase in_memory(const std::string& path);
 
   // Replaces the contents of `target` by a copy of this database, in one transaction.
   void copy_to(SqlDatabase& target);

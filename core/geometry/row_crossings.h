@@ -31,8 +31,9 @@ class FirstBeyond {
     slope_b_ = slope[b_] * steps;
     slope_c_ = slope[c_] * steps;
     at_v_ = static_cast<double>(t.v[0][axis]) * steps;
-    // The error of the estimate in find(): the slopes are rounded twice and the sums a few times,
-    // each time by at most 2^-53 of a term. Every term is at most about `largest`.
+    // The error of the estimate in find(): a slope is rounded up to three times, and the products
+    // and sums a few times, each time by at most 2^-53 of a term. Every term is at most about
+    // `largest`, so the error is below largest * 2^-49. Half a lattice unit is added as a reserve.
     const double largest =
         std::abs(at_v_) + std::abs(slope_b_) * extent(t, b_) + std::abs(slope_c_) * extent(t, c_);
     margin_ = 0.5 * steps + largest * 0x1p-49;

@@ -307,7 +307,7 @@ std::string temporary_parent() {
 
 std::string make_temporary_folder(const std::string& prefix) {
   std::string path = prefix + "XXXXXX";
-  if (!mkdtemp(path.data())) fail("make directory", path, errno);
+  if (!mkdtemp(path.data())) fail("create the temporary folder", prefix + "*", errno);
   return path;
 }
 

@@ -16,7 +16,8 @@ constexpr uint64_t kNodesBetweenChecks = 4096;
 constexpr uint64_t kMaxNodeWords = global_layout::kMaxNodeWords;
 
 // A child pointer of the level that is being written. `target` is the word offset of the child in
-// the input file. `number` counts the pointers of the level in the order of the output file.
+// the input file. `number` is the pointer's index among all pointers of the level, in the order of
+// the output file.
 struct Pointer {
   uint64_t target = 0;
   uint64_t number = 0;

@@ -20,8 +20,8 @@ std::string this_program() {
     throw Error(ErrorCode::kInvalidInput,
                 path +
                     ": the file of the running program was replaced or removed, so the tasks of "
-                    "the cluster cannot run it: expected the file to exist, or the path of the "
-                    "program on the nodes (cluster.program)");
+                    "the cluster cannot run it: expected the file to remain in place during the "
+                    "build (the setting cluster.program of a service can name another file)");
   return path;
 }
 

@@ -99,7 +99,7 @@ void check_options(const BuildSpec& spec) {
   if (g.thin && g.attributes.any())
     json_fields::refuse("thin", "no color and no attributes at the same time");
   if (g.thin && g.cutouts == CutoutRule::kSkip)
-    json_fields::refuse("thin", "no cutouts at the same time");
+    json_fields::refuse("thin", "cutouts other than skip");
   if (g.color_resolution && !g.attributes.any())
     json_fields::refuse("color_resolution", "color or attributes as well");
   if (g.color_resolution > g.resolution)

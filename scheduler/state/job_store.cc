@@ -183,7 +183,7 @@ JobStore::JobStore(const std::string& path, Access access, std::function<void()>
       sync_folder_(std::move(sync_folder)),
       is_in_memory_(access == Access::kBuildLater && !system_files().exists(path)),
       database_(is_in_memory_
-                    ? SqlDatabase::in_memory()
+                    ? SqlDatabase::in_memory(path)
                     : SqlDatabase(path, access == Access::kRead ? SqlDatabase::Mode::kReadOnly
                                                                 : SqlDatabase::Mode::kReadWrite)) {
   if (access != Access::kRead && !is_in_memory_) sync_folder_();

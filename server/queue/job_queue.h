@@ -42,8 +42,9 @@ struct IdempotencyKey {
 class JobQueue {
  public:
   // Opens the database at `path`. Creates it if it is missing and `may_create` is set. Throws
-  // Error{kCorrupt}, Error{kUnsupportedVersion}, and Error{kInvalidInput} for a database of another
-  // program, or for a missing database unless `may_create` is set.
+  // Error{kCorrupt} for a damaged database, Error{kUnsupportedVersion} for a version that this
+  // program cannot read, and Error{kInvalidInput} for a database of another program. Also throws
+  // Error{kInvalidInput} if the database is missing and `may_create` is not set.
   explicit JobQueue(const std::string& path, bool may_create = true);
   // Throws Error{kIo} if the database was removed or replaced.
   void check_file() const { file_.check(); }

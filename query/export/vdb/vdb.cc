@@ -55,7 +55,8 @@ struct VoxelGrid {
   const char* name;
   VdbNodeBytes open_vdb, nano_vdb;
   uint64_t value_bytes;  // bytes per voxel in a leaf of a .vdb file, not counting the masks
-  // `steps` is the total of the progress (ChargedVdb).
+  // These functions make the grid. They report their progress as a stage of `steps` units: leaves
+  // for the level set, voxels for the other grids.
   openvdb::GridBase::Ptr (*make)(const ExportJob& job, uint64_t steps);
   NanoGrid (*make_nano)(const ExportJob& job, uint64_t steps);
   // The values are distances from the surface. The file then has no color grid.

@@ -1,6 +1,7 @@
 // Streams whose operations run late. A call of the runtime only queues an operation. The operation
 // runs when a synchronization needs its result, or earlier if the schedule (schedule.h) decides so.
-// It runs on the host thread that synchronizes or makes the call, while this thread holds the lock.
+// In both cases it runs inside a call of the runtime, on the host thread that makes this call. This
+// thread holds device_lock() during the operation.
 #pragma once
 
 #include <cuda_runtime_api.h>
