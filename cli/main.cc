@@ -1,4 +1,8 @@
+#include <poll.h>
+#include <unistd.h>
+
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -22,11 +26,27 @@ int report(const Error& error) {
   return exit_status(error.code());
 }
 
+// True if standard output is a pipe that its reader has closed.
+bool is_reader_gone() {
+  pollfd output{STDOUT_FILENO, POLLOUT, 0};
+  return poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
+}
+
+// Ends the process by SIGPIPE, without a message, as a program ends that does not handle this
+// signal.
+[[noreturn]] void end_by_closed_pipe() {
+  std::signal(SIGPIPE, SIG_DFL);
+  std::raise(SIGPIPE);
+  _exit(128 + SIGPIPE);  // the caller of this process has blocked the signal
+}
+
 // Flushes standard output. Throws if the buffered text cannot be written, so that the command
-// fails.
+// fails. If its reader has closed the pipe, as `head` does after the first lines, ends the process
+// without a message: the reader has what it needs.
 void check_output() {
   errno = 0;
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;
+  if (errno == EPIPE || is_reader_gone()) end_by_closed_pipe();
   const int reason = errno ? errno : EIO;
   throw Error(code_of_errno(reason), "write to the standard output: " + errno_text(reason));
 }

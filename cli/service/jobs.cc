@@ -3,6 +3,8 @@
 #include "cli/output.h"
 #include "cli/service/job_text.h"
 #include "cli/service/service_options.h"
+#include "cli/service/table_text.h"
+#include "core/base/clock.h"
 #include "core/base/text/percent.h"
 #include "core/base/text/printable.h"
 
@@ -16,14 +18,30 @@ struct JobsCommand {
   bool json = false;
 };
 
+// Prints a line of the table. On a terminal with `columns` columns, cuts it to this length, so that
+// each job has one line.
+void print_line(const std::string& line, size_t columns) {
+  std::printf("%s\n", (columns > 0 ? cut_to_columns(line, columns) : line).c_str());
+}
+
 void print(const Json& answer) {
-  std::printf("%-16s  %-10s  %10s  %-28s  %s\n", "ID", "STATE", "RESOLUTION", "PROGRESS", "NAME");
+  constexpr size_t kMaxCells = 256;  // all columns before the name
+  const size_t columns = terminal_columns();
+  const double now_s = unix_seconds();
+  const auto print_row = [&](const std::string& id, const std::string& state,
+                             const std::string& age, const std::string& resolution,
+                             const std::string& progress, const std::string& name) {
+    char cells[kMaxCells];
+    std::snprintf(cells, sizeof cells, "%-16s  %-10s  %6s  %10s  %-28s  ", id.c_str(),
+                  state.c_str(), age.c_str(), resolution.c_str(), progress.c_str());
+    print_line(cells + name, columns);
+  };
+  print_row("ID", "STATE", "AGE", "RESOLUTION", "PROGRESS", "NAME");
   for (const Json& job : answer.at("jobs"))
-    std::printf("%-16s  %-10s  %10s  %-28s  %s\n",
-                printable_line(job.at("id").get<std::string>()).c_str(),
-                printable_line(job.at("state").get<std::string>()).c_str(),
-                job.at("resolution").dump().c_str(), progress_text(job).c_str(),
-                (job_title(job) + labels_text(job)).c_str());
+    print_row(printable_line(job.at("id").get<std::string>()),
+              printable_line(job.at("state").get<std::string>()),
+              age_text(job.at("created_at").get<std::string>(), now_s), job.at("resolution").dump(),
+              progress_text(job), job_title(job) + labels_text(job));
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 

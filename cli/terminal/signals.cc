@@ -68,7 +68,8 @@ void catch_signals(CancelToken& cancel) {
   if (hangup.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);
   // By default, these two signals end the process when it writes to a closed pipe or beyond the
   // limit of file sizes. If they are ignored, the write fails instead, and the command reports the
-  // error.
+  // error. (If the reader of standard output has closed the pipe, main() ends the process without a
+  // message.)
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }

@@ -1,11 +1,15 @@
 // Tests submit, jobs, watch, cancel, suspend, resume and download with a real server.
 #include <gmock/gmock.h>
+#include <pty.h>
 #include <signal.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <map>
+#include <sstream>
 #include <thread>
 #include <utility>
 
@@ -125,6 +129,10 @@ TEST_F(Client, LabelsAndFindsJobs) {
   EXPECT_EQ(found("--find", second["id"].get<std::string>().substr(0, 9)), "two ");
   const Answer listed = run({"jobs", "--label", night});
   EXPECT_NE(listed.out.find("one  #" + night + "  #b"), std::string::npos) << listed.out;
+  EXPECT_NE(listed.out.find("  AGE  RESOLUTION"), std::string::npos) << listed.out;
+  EXPECT_TRUE(listed.out.find(" s  ") != std::string::npos ||
+              listed.out.find(" min  ") != std::string::npos)
+      << listed.out;
 
   // Ids can be shortened as long as they are unique. Of 17 ids, two begin with the same digit.
   const std::string id = first["id"];
@@ -145,6 +153,31 @@ TEST_F(Client, LabelsAndFindsJobs) {
   for (int i = 0; i < 17; ++i) many.insert(many.end(), {"--label", std::to_string(i)});
   expect_error(2, "--label: 17 items", many);
   EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), uploaded);
+}
+
+// On a terminal, `jobs` cuts each line to the terminal's width. Otherwise it prints all of it.
+TEST_F(Client, CutsTheTableAtTheWidthOfTheTerminal) {
+  const std::string name = "begin of the name, " + std::string(100, 'x') + " end";
+  run_json({"submit", "m.glb", "-r", "16", "--name", name});
+  EXPECT_NE(run({"jobs"}).out.find(name + "\n"), std::string::npos);
+  constexpr size_t kColumns = 96;
+  struct winsize size {};
+  size.ws_col = kColumns;
+  int terminal = -1, program = -1;
+  ASSERT_EQ(openpty(&terminal, &program, nullptr, nullptr, &size), 0);
+  EXPECT_EQ(wait_for(start({"jobs"}, program)).status, 0);
+  close(program);
+  std::string text;
+  char bytes[4096];
+  for (ssize_t n; (n = read(terminal, bytes, sizeof bytes)) > 0;)
+    text.append(bytes, static_cast<size_t>(n));
+  close(terminal);
+  EXPECT_NE(text.find("  begin of t"), std::string::npos) << text;
+  EXPECT_NE(text.find("\u2026\r\n"), std::string::npos) << text;
+  EXPECT_EQ(text.find(" end"), std::string::npos) << text;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_LE(line.size(), kColumns + 3) << line;  // with two more bytes of the ellipsis, and CR
 }
 
 // A file is uploaded only once. If the server has a part of the file, only the remaining part is

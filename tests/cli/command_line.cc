@@ -18,7 +18,7 @@ void redirect(int fd, const std::string& path) {
 
 }  // namespace
 
-pid_t CommandLine::start(const std::vector<std::string>& args) {
+pid_t CommandLine::start(const std::vector<std::string>& args, int output) {
   std::vector<char*> argv = {const_cast<char*>("voxdag")};
   for (const std::string& arg : args) argv.push_back(const_cast<char*>(arg.c_str()));
   argv.push_back(nullptr);
@@ -26,6 +26,7 @@ pid_t CommandLine::start(const std::vector<std::string>& args) {
   if (pid != 0) return pid;
   if (chdir(folder_.path().c_str()) != 0) _exit(127);
   redirect(STDOUT_FILENO, ".stdout");
+  if (output >= 0 && dup2(output, STDOUT_FILENO) < 0) _exit(127);
   redirect(STDERR_FILENO, ".stderr");
   execv(VOXDAG_BINARY, argv.data());
   _exit(127);

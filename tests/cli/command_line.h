@@ -25,7 +25,8 @@ class CommandLine : public testing::Test {
   // Runs `voxdag ARGS...` within folder_.
   Answer run(const std::vector<std::string>& args);
   // Starts `voxdag ARGS...` without waiting; wait_for() returns its output.
-  pid_t start(const std::vector<std::string>& args);
+  // Standard output is `output`, or a file if `output` is -1.
+  pid_t start(const std::vector<std::string>& args, int output = -1);
   Answer wait_for(pid_t pid);
   // Runs `voxdag`, expects success, and parses standard output, which must be JSON and nothing
   // else.

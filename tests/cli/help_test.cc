@@ -1,5 +1,9 @@
 // Tests of --help, --version and mistyped commands.
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <csignal>
 
 #include "scheduler/spec/build_fields.h"
 #include "tests/cli/command_line.h"
@@ -36,6 +40,34 @@ TEST_F(Help, OfEveryCommand) {
     EXPECT_NE(answer.out.find(std::string("Usage: voxdag ") + command), std::string::npos);
     EXPECT_NE(answer.out.find("--json"), std::string::npos);
   }
+}
+
+// If the reader of the standard output has closed the pipe, as `head` does, commands end by SIGPIPE
+// and print no error. The output of `build --help` is longer than the buffer of the standard
+// output, the output of `version` is shorter.
+TEST_F(Help, EndsQuietlyIfItsReaderHasLeft) {
+  for (const std::vector<std::string>& args : {std::vector<std::string>{"build", "--help"},
+                                               {"version"},
+                                               {"help", "jobs"},
+                                               {"version", "--json"}}) {
+    int ends[2];
+    ASSERT_EQ(pipe(ends), 0);
+    close(ends[0]);
+    const Answer answer = wait_for(start(args, ends[1]));
+    close(ends[1]);
+    EXPECT_EQ(answer.status, 128 + SIGPIPE) << args[0];
+    EXPECT_EQ(answer.err, "") << args[0];
+  }
+}
+
+// A full disk is an error.
+TEST_F(Help, ReportsThatItCannotBeWritten) {
+  const int full = open("/dev/full", O_WRONLY);
+  ASSERT_GE(full, 0);
+  const Answer answer = wait_for(start({"version"}, full));
+  close(full);
+  EXPECT_EQ(answer.status, 7) << answer.err;
+  EXPECT_NE(answer.err.find("write to the standard output: "), std::string::npos) << answer.err;
 }
 
 // Checks for each field that the help text has its option exactly if the field's scope is at most

@@ -1,0 +1,23 @@
+// Texts of the tables that commands of the service print.
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace voxdag::cli {
+
+// Returns the time since a moment, such as "45 s", "12 min", "3 h" or "5 d", rounded down.
+// `moment` is a time of the service, such as "2026-11-21T07:00:00.123Z". Returns "" for other text,
+// and "0 s" for a moment in the future, because the clocks of two machines can differ. `now_s` is a
+// Unix time.
+std::string age_text(const std::string& moment, double now_s);
+
+// Returns `text` (UTF-8) if it needs at most `columns` columns of a terminal; otherwise its begin
+// and "…", together at most `columns` columns. Most characters of Chinese, Japanese and Korean
+// text, and emoji, need two columns.
+std::string cut_to_columns(const std::string& text, size_t columns);
+
+// Returns the number of columns if standard output is a terminal that has a size; otherwise 0.
+size_t terminal_columns();
+
+}  // namespace voxdag::cli
