@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
+#include "core/base/options/option_text.h"
 
 namespace voxdag {
 
@@ -22,10 +23,10 @@ class GrowingCharge {
   // one step do not fit the budget.
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
-    throw Error(
-        ErrorCode::kOutOfMemory,
-        "out of memory: " + what_ + " needs over " + std::to_string(bytes) +
-            " bytes, more than the memory budget has left: expected a larger budget (--memory)");
+    throw Error(ErrorCode::kOutOfMemory,
+                "out of memory: " + what_ + " needs over " + std::to_string(bytes) +
+                    " bytes, more than the memory budget has left: expected a larger budget (" +
+                    option_text("memory") + ")");
   }
   // Charges `bytes` more. The total is the sum of all calls of add().
   void add(uint64_t bytes) { grow_to(added_ += bytes); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text/printable.h"
 
 namespace voxdag {
@@ -27,6 +28,11 @@ std::string without_prefix(std::string message) {
 std::string numbered(int index, const std::string& name) {
   const std::string number = std::to_string(index);
   return name.empty() ? number : number + " \"" + printable(name) + "\"";
+}
+
+std::string not_finite() {
+  return " is not a finite position, expected finite coordinates (" + option_text("skip_invalid") +
+         " drops these triangles)";
 }
 
 void refuse(const std::string& path, const std::string& what) {

@@ -21,9 +21,9 @@ std::string without_prefix(std::string message);
 // empty.
 std::string numbered(int index, const std::string& name);
 
-// Follows the name of a vertex or point in the message about an invalid triangle or point.
-inline constexpr const char* kNotFinite =
-    " is not a finite position, expected finite coordinates (--skip-invalid drops these triangles)";
+// Returns the text that follows the name of a vertex or point in the message about an invalid
+// triangle or point.
+std::string not_finite();
 
 // Throws Error{kInvalidInput}: "<scene file>: <what>".
 [[noreturn]] void refuse(const std::string& path, const std::string& what);

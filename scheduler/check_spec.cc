@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/io/overwrite.h"
 #include "scene/formats/formats.h"
@@ -27,8 +28,8 @@ bool is_report(const ReadableFile& file) { return begins_with(file, "{\n  \"outp
 void check_solid(const RunOptions& run) {
   if (run.backend == BackendName::kCuda || run.backend == BackendName::kParallelHost)
     throw Error(ErrorCode::kInvalidInput, std::string("backend ") + name_of(run.backend) +
-                                              ": it does not fill solids; expected --backend cpu "
-                                              "or auto");
+                                              ": it does not fill solids; expected " +
+                                              option_text("backend", "cpu") + " or auto");
 }
 
 }  // namespace
@@ -45,8 +46,9 @@ BuildSpec checked(const BuildSpec& spec) {
   if (solid_rule_of(g) != SolidRule::kNone) check_solid(r);
   if (r.report == "none" && r.cluster && r.cluster->merge_job)
     throw Error(ErrorCode::kInvalidInput,
-                "--report none: expected a report with --cluster-merge, because the merge job "
-                "returns its results in it");
+                option_text("report", "none") +
+                    ": expected a report with --cluster-merge, because the merge job "
+                    "returns its results in it");
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();
@@ -97,8 +99,8 @@ namespace {
 
 void check_report(FileSystem& files, const std::string& report, const std::string& output) {
   if (report == output || report == output + ".partial" || report.ends_with('/'))
-    throw Error(ErrorCode::kInvalidInput,
-                "--report " + report + ": expected a file other than the output, or none");
+    throw Error(ErrorCode::kInvalidInput, option_text("report") + " " + report +
+                                              ": expected a file other than the output, or none");
   refuse_foreign_file(files, report, is_report, " (the report)");
   refuse_foreign_file(files, report + ".partial", is_report, " (the report)");
   files.make_directories(parent_directory(report));
@@ -118,8 +120,8 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
     return std::filesystem::weakly_canonical(path + "/.");
   };
   if (!spec.run.cache_folder.empty() && resolved(spec.run.cache_folder) == resolved(work))
-    throw Error(ErrorCode::kInvalidInput,
-                work + " is both the cache (--cache) and the work folder: expected two folders");
+    throw Error(ErrorCode::kInvalidInput, work + " is both the cache (" + option_text("cache") +
+                                              ") and the work folder: expected two folders");
   const std::string partial = output + ".partial", report = report_path(spec.run);
   std::vector<std::string> outputs = {output, partial, OutputLock::path_of(output)};
   if (!report.empty()) outputs.insert(outputs.end(), {report, report + ".partial"});

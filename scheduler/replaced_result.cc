@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/fields/field.h"
 #include "core/fields/json_fields.h"
 #include "core/format/global/open_global.h"
@@ -62,10 +63,10 @@ void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
   const std::string found =
       report ? "is the result of another scene, " + joined(report->scenes)
              : "exists, and no report shows that " + joined(scenes) + " is its scene";
-  throw Error(ErrorCode::kInvalidInput, "-o " + run.output + ": " + found +
-                                            ", and would be replaced" +
-                                            (report ? " by " + joined(scenes) : "") +
-                                            ": expected another output; --force replaces it");
+  throw Error(ErrorCode::kInvalidInput,
+              "-o " + run.output + ": " + found + ", and would be replaced" +
+                  (report ? " by " + joined(scenes) : "") + ": expected another output; " +
+                  option_text("force") + " replaces it");
 }
 
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/io/outputs/guarded_outputs.h"
@@ -85,7 +86,8 @@ void check_empty(BuildJob& job, uint64_t declared) {
   if (!job.spec.run.allow_empty) {
     for (const Warning& warning : job.store->warnings()) message += "; " + warning.text();
     throw Error(ErrorCode::kInvalidInput,
-                scenes + ": " + message + "; --allow-empty writes a file without voxels");
+                scenes + ": " + message + "; " + option_text("allow_empty") +
+                    " writes a file without voxels");
   }
   job.context.progress.warn_of_input(
       {"empty-scene", scenes, message + "; the file will have no nodes"});

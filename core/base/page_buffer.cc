@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 
 namespace voxdag {
@@ -66,6 +67,13 @@ void free_pages(void* pages, size_t bytes) {
     std::free(pages);
   else
     munmap(pages, bytes);
+}
+
+void refuse_growth(size_t bytes, std::string_view what) {
+  throw Error(ErrorCode::kOutOfMemory,
+              "out of memory: " + std::string(what) + " needs " + std::to_string(bytes) +
+                  " bytes, more than the memory budget has left: expected a larger budget (" +
+                  option_text("memory") + ")");
 }
 
 }  // namespace voxdag

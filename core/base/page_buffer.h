@@ -25,6 +25,8 @@ void* allocate_pages(size_t bytes, std::string_view what);
 // not copied (except in builds with ThreadSanitizer). Throws like allocate_pages().
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
+// Throws Error{kOutOfMemory}: the memory budget has no `bytes` bytes for `what`.
+[[noreturn]] void refuse_growth(size_t bytes, std::string_view what);
 
 template <class T>
 class PageBuffer {
@@ -60,11 +62,7 @@ class PageBuffer {
   // does not fit; the buffer is then unchanged.
   void grow(size_t size, std::string_view what) {
     const uint64_t old_bytes = charge_.bytes();
-    if (!charge_.try_resize(byte_count(size)))
-      throw Error(
-          ErrorCode::kOutOfMemory,
-          "out of memory: " + std::string(what) + " needs " + std::to_string(byte_count(size)) +
-              " bytes, more than the memory budget has left: expected a larger budget (--memory)");
+    if (!charge_.try_resize(byte_count(size))) refuse_growth(byte_count(size), what);
     try {
       data_ = static_cast<T*>(grow_pages(data_, old_bytes, byte_count(size), what));
     } catch (...) {

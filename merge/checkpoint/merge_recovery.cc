@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 
 namespace voxdag {
 namespace {
@@ -52,15 +53,16 @@ PassProgress MergeRecovery::resume(const MergeState& state, GlobalFileWriter& ou
 
 PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, GlobalFileWriter& out) {
   if (state.output != out.path())
-    throw Error(ErrorCode::kInvalidInput, "the interrupted merge was writing " + state.output +
-                                              ", not " + out.path() +
-                                              ": expected the same output, or --restart");
+    throw Error(ErrorCode::kInvalidInput,
+                "the interrupted merge was writing " + state.output + ", not " + out.path() +
+                    ": expected the same output, or " + option_text("restart"));
   if (!pending_.fit_at_once(context_.plan.partition_bytes))
     throw Error(ErrorCode::kOutOfMemory,
                 "out of memory: the interrupted merge used more memory than the " +
                     std::to_string(context_.plan.partition_bytes) +
                     " bytes that this run has for a part of the merge: expected as much memory as "
-                    "before (--memory), or --restart");
+                    "before (" +
+                    option_text("memory") + "), or " + option_text("restart"));
   if (state.narrow_words != out.narrow_words())
     throw Error(ErrorCode::kCorrupt, "the interrupted merge made levels wide if they have over " +
                                          std::to_string(state.narrow_words) +

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "merge/fallback/hash_group_merge.h"
 #include "merge/fallback/heap_merge.h"
@@ -225,7 +226,8 @@ void check_group_is_large(const LevelTask& task, uint64_t hash) {
                                            std::to_string(task.level) + " of " +
                                            std::to_string(task.runs.size()) +
                                            " inputs takes more than the merge's share of memory: "
-                                           "expected more memory (--memory)");
+                                           "expected more memory (" +
+                                           option_text("memory") + ")");
 }
 
 }  // namespace

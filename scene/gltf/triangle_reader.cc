@@ -279,7 +279,7 @@ void TriangleReader::report(const uint32_t* corners) const {
                                  " vertices");
   refuse(document_.path, where + "a vertex of " + document_.name_accessor(primitive.position) +
                              (voxdag::is_finite(world_) ? "" : " with the node's transform") +
-                             kNotFinite);
+                             not_finite());
 }
 
 }  // namespace voxdag::gltf

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 
@@ -156,8 +157,8 @@ class Child {
             ": the system ended the process that converts the file, probably because memory ran "
             "out: expected more free memory");
   throw Error(ErrorCode::kInvalidInput, what + ": the process that converts the file crashed (" +
-                                            strsignal(signal) +
-                                            "); the file may be damaged, or --memory too small");
+                                            strsignal(signal) + "); the file may be damaged, or " +
+                                            option_text("memory") + " too small");
 }
 
 }  // namespace
@@ -180,8 +181,8 @@ void run_confined(const std::string& what, uint64_t memory_bytes,
   if (WIFSIGNALED(status)) report_signal(what, WTERMSIG(status));
   if (WEXITSTATUS(status) == kNoMemory)
     throw Error(ErrorCode::kOutOfMemory, what + ": takes more memory than the limit, " +
-                                             size_text(memory_bytes) +
-                                             ": expected a higher --memory");
+                                             size_text(memory_bytes) + ": expected a higher " +
+                                             option_text("memory"));
   if (WEXITSTATUS(status) == kDone) return;
   if (error.is_null())
     throw Error(ErrorCode::kIo, what + ": the process that converts the file ended with status " +

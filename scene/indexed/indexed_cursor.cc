@@ -115,8 +115,8 @@ void IndexedCursor::report(uint64_t triangle, const uint32_t* corners) {
                                 " vertices");
   for (int k = 0; k < 3; ++k)
     if (std::isnan(cache_.at(corners[k])[0]))
-      refuse(mesh_->path(), where + mesh_->name_vertex(corners[k]) + kNotFinite);
-  refuse(mesh_->path(), where + "a vertex" + kNotFinite);
+      refuse(mesh_->path(), where + mesh_->name_vertex(corners[k]) + not_finite());
+  refuse(mesh_->path(), where + "a vertex" + not_finite());
 }
 
 }  // namespace voxdag

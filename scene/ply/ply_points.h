@@ -34,7 +34,7 @@ class VertexPointReader : public points::PointReader {
     for (size_t i = 0; i < count; ++i) out[i] = scale.to_color(&numbers_[scale.channels() * i]);
   }
   std::string fault_of(uint64_t point) override {
-    return "vertex " + std::to_string(point) + kNotFinite;
+    return "vertex " + std::to_string(point) + not_finite();
   }
 
  private:

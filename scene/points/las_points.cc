@@ -126,7 +126,7 @@ class LasReader : public PointReader {
   }
 
   std::string fault_of(uint64_t point) override {
-    return "point " + std::to_string(point) + kNotFinite;
+    return "point " + std::to_string(point) + not_finite();
   }
 
  private:

@@ -76,7 +76,7 @@ class StlCursor : public TriangleCursor {
     for (size_t i = 0; i < count; ++i) {
       if (!is_finite(batch_[i])) {
         if (!skip_invalid_)
-          refuse(stl_.file().path(), facets_->place_of(first + i) + ": a vertex" + kNotFinite);
+          refuse(stl_.file().path(), facets_->place_of(first + i) + ": a vertex" + not_finite());
         continue;
       }
       if (kept < i) {

@@ -1,5 +1,6 @@
 // The functions of cluster.h in a program without cluster support.
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "scheduler/cluster/cluster.h"
 
 namespace voxdag {
@@ -33,8 +34,8 @@ std::unique_ptr<MergeJob> make_merge_job(const BuildSpec&, const TriangleSource&
 
 void accept_earlier_tasks(BuildJob& job, const std::string&) {
   if (has_tasks(job.context.files, job.work.path()))
-    throw Error(ErrorCode::kInvalidInput,
-                tasks_message(job.work.path()) + ", or --restart to start over");
+    throw Error(ErrorCode::kInvalidInput, tasks_message(job.work.path()) + ", or " +
+                                              option_text("restart") + " to start over");
 }
 
 void remove_tasks(BuildJob& job) {

@@ -1,6 +1,7 @@
 #include "scheduler/solid/row_file.h"
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/checksum.h"
 #include "scheduler/solid/row_codec.h"
 
@@ -9,7 +10,7 @@ namespace {
 
 [[noreturn]] void refuse_damage(const std::string& path, const RowExtent& extent) {
   throw Error(ErrorCode::kCorrupt, path + ": the rows at byte " + std::to_string(extent.offset) +
-                                       " are damaged: start over with --restart");
+                                       " are damaged: start over with " + option_text("restart"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "scheduler/solid/seed.h"
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 
 namespace voxdag {
@@ -21,7 +22,8 @@ std::optional<Seed> seed_of(const GeometryOptions& options, const Grid& grid) {
   for (size_t a = 0; a < 3; ++a) {
     if (!(snapped[a] >= 0 && snapped[a] < end))
       throw Error(ErrorCode::kInvalidInput,
-                  "--seed " + seed.text + ": the point is outside the grid, whose low corner is " +
+                  option_text("seed", seed.text) +
+                      ": the point is outside the grid, whose low corner is " +
                       point_text(grid.origin) + " and whose edge is " + number_text(grid.edge) +
                       ": expected a point in the grid");
     seed.voxel[a] = static_cast<uint32_t>(static_cast<int64_t>(snapped[a]) / kUnitsPerVoxel);
@@ -51,13 +53,12 @@ CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels
 void refuse_seed_in_shell(const Seed& seed) {
   if (seed.radius > 0)
     throw Error(ErrorCode::kInvalidInput,
-                "--seed " + seed.text + ": the surface touches the cube of " +
-                    std::to_string(seed.radius + 1) +
-                    " voxels per edge around this point, which --radius " +
-                    std::to_string(seed.radius) +
+                option_text("seed", seed.text) + ": the surface touches the cube of " +
+                    std::to_string(seed.radius + 1) + " voxels per edge around this point, which " +
+                    option_text("radius", std::to_string(seed.radius)) +
                     " needs: expected a point farther from surfaces, or a smaller radius");
   throw Error(ErrorCode::kInvalidInput,
-              "--seed " + seed.text +
+              option_text("seed", seed.text) +
                   ": the surface touches the voxel of this point: expected a "
                   "point in empty space, at least a voxel away from surfaces");
 }

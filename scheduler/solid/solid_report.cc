@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "core/fields/field.h"
 #include "scheduler/spec/build_spec.h"
@@ -61,31 +62,28 @@ std::optional<Warning> solid_warning(const SolidReport& report, const std::strin
     if (report.interior != 0) return std::nullopt;
     return Warning{
         "solid-reached", scene,
-        "nothing is enclosed: walks from the border of the grid reach every empty voxel; --radius "
-        "V seals gaps of up to V voxels"};
+        "nothing is enclosed: walks from the border of the grid reach every empty voxel; " +
+            option_text("radius") + " V seals gaps of up to V voxels"};
   }
   if (report.rows == 0) return std::nullopt;
   const bool is_parity = report.rule == name_of(SolidName::kParity);
   const uint64_t open = is_parity ? report.odd_rows : report.open_rows;
   const double part = static_cast<double>(open) / static_cast<double>(report.rows);
   if (report.interior == 0 && report.open_rows == 0 && report.odd_rows == 0)
-    return Warning{
-        "solid-canceled", scene,
-        "nothing is inside: the faces cancel each other, as double-sided faces do; --solid "
-        "enclosed fills what nothing reaches"};
+    return Warning{"solid-canceled", scene,
+                   "nothing is inside: the faces cancel each other, as double-sided faces do; " +
+                       option_text("solid", "enclosed") + " fills what nothing reaches"};
   if (!is_parity && open > 0 && report.odd_rows == 0)
-    return Warning{"solid-orientation", scene,
-                   "the surface is closed, but its faces are oriented inconsistently (" +
-                       percent_text(part) +
-                       " of the sample rows): --solid parity ignores orientation"};
-  if (part > kScene)
     return Warning{
-        "solid-open", scene,
-        "the surface is not closed (" + percent_text(part) +
-            " of the sample rows), so it is more a scene than an object: " +
-            count_text(report.disputed) +
-            " filled voxels rest on a majority; --solid enclosed fills only what nothing "
-            "reaches"};
+        "solid-orientation", scene,
+        "the surface is closed, but its faces are oriented inconsistently (" + percent_text(part) +
+            " of the sample rows): " + option_text("solid", "parity") + " ignores orientation"};
+  if (part > kScene)
+    return Warning{"solid-open", scene,
+                   "the surface is not closed (" + percent_text(part) +
+                       " of the sample rows), so it is more a scene than an object: " +
+                       count_text(report.disputed) + " filled voxels rest on a majority; " +
+                       option_text("solid", "enclosed") + " fills only what nothing reaches"};
   if (part > kClosed)
     return Warning{"solid-open", scene,
                    "the surface is not closed (" + percent_text(part) + " of the sample rows): " +

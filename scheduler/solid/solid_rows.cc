@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/checksum.h"
 #include "core/format/cube_bytes.h"
 #include "scheduler/solid/row_sums.h"
@@ -92,8 +93,8 @@ SubvolumeRows SolidRows::find(const Cube& cube) const {
   const auto found = cubes_.find(cube);
   if (found == cubes_.end())
     throw Error(ErrorCode::kCorrupt, path_ + ": it lacks the rows of a subvolume of level " +
-                                         std::to_string(cube.level) +
-                                         ": start over with --restart");
+                                         std::to_string(cube.level) + ": start over with " +
+                                         option_text("restart"));
   return found->second;
 }
 

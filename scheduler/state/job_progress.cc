@@ -3,6 +3,7 @@
 #include <set>
 #include <utility>
 
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 
 namespace voxdag {
@@ -13,7 +14,8 @@ constexpr double kWriteIntervalS = 1;
 }  // namespace
 
 void refuse_warning(const Warning& warning) {
-  throw Error(ErrorCode::kInvalidInput, warning.text() + "; --strict makes this an error");
+  throw Error(ErrorCode::kInvalidInput,
+              warning.text() + "; " + option_text("strict") + " makes this an error");
 }
 
 template <class Change>

@@ -1,6 +1,7 @@
 #include "scheduler/state/job_store.h"
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/db/table_rows.h"
 #include "core/format/artifact/artifact_fields.h"
 #include "core/format/checksum.h"
@@ -159,7 +160,8 @@ template <class Record>
 Record unsealed(Sealed<Record> sealed, const std::string& what) {
   if (sealed.checksum != checksum_of(sealed.record))
     throw Error(ErrorCode::kCorrupt, "the job store (job.db in the work folder): the row of " +
-                                         what + " fails its checksum: start over with --restart");
+                                         what + " fails its checksum: start over with " +
+                                         option_text("restart"));
   return std::move(sealed.record);
 }
 
@@ -195,8 +197,8 @@ JobStore::JobStore(const std::string& path, Access access, std::function<void()>
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kCorrupt && error.code() != ErrorCode::kUnsupportedVersion)
       throw;
-    throw Error(error.code(),
-                "job store " + path + ": " + error.message() + "; start over with --restart");
+    throw Error(error.code(), "job store " + path + ": " + error.message() + "; start over with " +
+                                  option_text("restart"));
   }
 }
 
@@ -262,7 +264,7 @@ std::vector<StoredSubvolume> JobStore::leaves() {
                 "the job store (job.db in the work folder): the rows of the subvolumes are "
                 "complete only up to " +
                     std::to_string(count) + ": expected " + std::to_string(job.subvolumes) +
-                    "; start over with --restart");
+                    "; start over with " + option_text("restart"));
   return leaves;
 }
 
@@ -301,7 +303,8 @@ std::vector<SubvolumeId> JobStore::record_split(const StoredSubvolume& whole,
   if (!job)
     throw Error(ErrorCode::kCorrupt,
                 "the job store (job.db in the work folder): the row of the job is missing: start "
-                "over with --restart");
+                "over with " +
+                    option_text("restart"));
   SubvolumeId next = job->subvolumes + 1;
   job->subvolumes += static_cast<int64_t>(parts.size());
   put_sealed(database_, "job", *job);

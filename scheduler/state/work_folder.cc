@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/format/artifact/segment_writer.h"
 #include "core/io/host_name.h"
@@ -101,7 +102,8 @@ void WorkFolder::check_is_ours() const {
     throw Error(ErrorCode::kInvalidInput,
                 "the work folder " + path_ + " holds " + name +
                     ", which was not created by voxdag: expected an empty "
-                    "folder or the folder of an earlier build (--work)");
+                    "folder or the folder of an earlier build (" +
+                    option_text("work") + ")");
   };
   for (const DirectoryEntry& entry : files_.list(path_))
     if (!is_ours(entry)) refuse(entry.name);

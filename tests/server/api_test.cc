@@ -452,5 +452,17 @@ TEST_F(Api, WritesAnAuditLog) {
   EXPECT_EQ(text.find("audit GET"), std::string::npos);
 }
 
+// Errors of jobs name options as the members of the request, not as the command line spells them.
+TEST_F(Api, NamesOptionsAsMembers) {
+  start();
+  put_scene("m.glb", scene_bytes());
+  const std::string id = post_job(
+      {{"scene", "m.glb"}, {"resolution", 64}, {"options", {{"bounds", {1000, 1000, 1000, 1}}}}});
+  ASSERT_TRUE(until_state(id, "failed"));
+  const std::string message = job(id)["error"]["message"];
+  EXPECT_NE(message.find("'allow_empty'"), std::string::npos) << message;
+  EXPECT_EQ(message.find("--"), std::string::npos) << message;
+}
+
 }  // namespace
 }  // namespace voxdag::server

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
@@ -149,7 +150,8 @@ ColorDiff diff_colors(const File& a, const File& b, unsigned threads, const Canc
   for (const File* file : {&a, &b})
     if (!file->has_colors())
       throw Error(ErrorCode::kInvalidInput,
-                  file->path() + " has no colors: expected files that were built with --color");
+                  file->path() + " has no colors: expected files that were built with " +
+                      option_text("color"));
   if (a.grid_levels() != b.grid_levels())
     throw Error(ErrorCode::kInvalidInput,
                 "only colors of the same grid can be compared: " + a.path() + " has 2^" +

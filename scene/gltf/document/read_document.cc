@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "scene/gltf/document/model_reader.h"
 #include "scene/gltf/document/read_elements.h"
@@ -27,9 +28,9 @@ void check_extensions(Document& d, const std::vector<std::string>& ignored) {
       warn("harmless-extension", extension + " is not read: " + info.purpose);
     if (info.support != ExtensionSupport::kUnknown) continue;
     if (std::ranges::find(ignored, name) == ignored.end())
-      refuse(d.path,
-             "requires the extension " + printable(name) +
-                 ", which voxdag does not read; --ignore-extension reads the file without it");
+      refuse(d.path, "requires the extension " + printable(name) +
+                         ", which voxdag does not read; " + option_text("ignore_extension") +
+                         " reads the file without it");
     warn("ignored-extension", extension + " is ignored on request");
   }
   for (const std::string& name : d.extensions_used)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/base/options/option_text.h"
 #include "core/color/snap_surface.h"
 #include "core/format/checksum.h"
 #include "scheduler/stages/ingest/ingest.h"
@@ -153,7 +154,8 @@ BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning
                 "the scene's triangles differ from the built triangles (digest " +
                     binning.digest.substr(0, 16) + ", now " + digest.hex().substr(0, 16) +
                     "): expected a scene that does not change during the build; start over "
-                    "(--restart)");
+                    "(" +
+                    option_text("restart") + ")");
   return binned;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
 #include "core/color/cell_values.h"
@@ -64,12 +65,12 @@ uint64_t count_finest_cells(const ReadableFile& file) {
 void check_list(std::span<const std::string> materials) {
   const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
   if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
-    throw Error(ErrorCode::kLimit, "the scene has " + std::to_string(materials.size()) +
-                                       " materials, with names of " + std::to_string(bytes) +
-                                       " bytes: expected up to " +
-                                       std::to_string(color_layout::kMaxMaterials) + " and " +
-                                       std::to_string(color_layout::kMaxNamesBytes) +
-                                       " bytes; leave out --attributes material");
+    throw Error(ErrorCode::kLimit,
+                "the scene has " + std::to_string(materials.size()) + " materials, with names of " +
+                    std::to_string(bytes) + " bytes: expected up to " +
+                    std::to_string(color_layout::kMaxMaterials) + " and " +
+                    std::to_string(color_layout::kMaxNamesBytes) + " bytes; leave out " +
+                    option_text("attributes", "material"));
 }
 
 // A thread's objects for baking cubes, and its result for the current cube.
@@ -203,7 +204,8 @@ void ColorStage::State::warn_of_white() const {
   context.build.progress.warn_of_input(
       {"no-colors", source.options.scenes.front(),
        "the scene has no colors: its materials and vertices are white, without images. So all "
-       "voxels are white; leave out --color"});
+       "voxels are white; leave out " +
+           option_text("color")});
 }
 
 // Decodes the images that are needed to bake the cubes whose records are not stored.

@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/fields/field.h"
 #include "scheduler/spec/gpu_use.h"
 
@@ -56,12 +57,14 @@ void check_backend(const RunOptions& options, VoxelRule rule) {
       options.backend == BackendName::kParallelHost || options.backend == BackendName::kCuda;
   if (parallel && !traits_of(rule).is_parallel)
     refuse_backend("backend " + backend + ": it does not have the rule '" + traits_of(rule).name +
-                   "'; expected --backend cpu or auto");
+                   "'; expected " + option_text("backend", "cpu") + " or auto");
   const bool is_given = options.method != MethodName::kDefault;
   if (is_given && parallel == (options.method == MethodName::kConsing))
     refuse_backend("method '" + method + "': backend " + backend +
-                   (parallel ? " does not have it: expected --method pointers or hashes"
-                             : " does not have it: expected --backend parallel-host or cuda"));
+                   (parallel ? " does not have it: expected " + option_text("method", "pointers") +
+                                   " or hashes"
+                             : " does not have it: expected " +
+                                   option_text("backend", "parallel-host") + " or cuda"));
   if (options.backend == BackendName::kCuda && !cuda_device_available())
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }
@@ -79,7 +82,8 @@ BackendChoice choose_backend(const RunOptions& options, VoxelRule rule, double b
 BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Progress& progress) {
   if (gpus.count == 0) return cpu_choice();
   if (memory_bytes < kMinMemoryForGpu) {
-    progress.warn("building on the CPU: a GPU needs --memory of at least 2 GiB");
+    progress.warn("building on the CPU: a GPU needs " + option_text("memory") +
+                  " of at least 2 GiB");
     return cpu_choice();
   }
   for (int device = 0; device < gpus.count; ++device) {

@@ -7,6 +7,7 @@
 #include "core/backend/backend.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_report.h"
@@ -48,7 +49,8 @@ void EncloseWorker::refuse_memory() const {
   throw Error(ErrorCode::kOutOfMemory,
               "the empty space of a subvolume of " + std::to_string(kSmallestEdge) +
                   " voxels per edge does not fit a worker's share of " +
-                  std::to_string(share.limit()) + " bytes: expected more memory (--memory)");
+                  std::to_string(share.limit()) + " bytes: expected more memory (" +
+                  option_text("memory") + ")");
 }
 
 EncloseWorkers make_enclose_workers(BuildJob& job, const WorkerMemory& memory) {

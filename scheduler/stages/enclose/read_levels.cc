@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/geometry/octree_descent.h"
 
 namespace voxdag {
@@ -85,8 +86,8 @@ class LevelsReader {
  private:
   [[noreturn]] void refuse(const std::string& problem) const {
     throw Error(ErrorCode::kCorrupt, artifact_.place() + ": " + problem +
-                                         ", expected a complete artifact; start over with "
-                                         "--restart");
+                                         ", expected a complete artifact; start over with " +
+                                         option_text("restart"));
   }
 
   const ArtifactLevel& level(uint32_t number) const {

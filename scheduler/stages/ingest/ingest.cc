@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/page_buffer.h"
 #include "core/color/patches/visible_patches.h"
 #include "core/color/snap_surface.h"
@@ -241,7 +242,8 @@ void ingest(TriangleSource& scene, IngestState& state, TriangleStore& store, Top
                   std::to_string(counts.triangles + counts.dropped_outside + *piece.too_far()) +
                   " of the scene reaches into the grid and has a vertex 2^32 or more voxels away "
                   "from the grid's low corner: expected less than 2^32 voxels on each axis "
-                  "(--bounds)");
+                  "(" +
+                  option_text("bounds") + ")");
         const auto add_to_store = [&] {
           context.build.cancel.check();
           counts.expected_voxels += piece.counts().expected_voxels;

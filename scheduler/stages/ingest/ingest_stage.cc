@@ -9,6 +9,7 @@
 
 #include "core/backend/backend.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "scene/formats/formats.h"
 #include "scene/textures/find_cutouts.h"
@@ -192,11 +193,11 @@ class Preparation {
   }
   void warn_of_kept_cutouts(uint64_t materials, WarningList& warnings) const {
     if (materials == 0) return;
-    warnings.add(
-        {"kept-cutouts", spec_.geometry.scenes.front(),
-         std::to_string(materials) + (materials == 1 ? " material has" : " materials have") +
-             " an alpha mode that may cut out parts of surfaces, which are kept; --cutouts skip "
-             "leaves them out"});
+    warnings.add({"kept-cutouts", spec_.geometry.scenes.front(),
+                  std::to_string(materials) +
+                      (materials == 1 ? " material has" : " materials have") +
+                      " an alpha mode that may cut out parts of surfaces, which are kept; " +
+                      option_text("cutouts", "skip") + " leaves them out"});
   }
   const Cutouts* cutouts() const { return cutouts_ ? &*cutouts_ : nullptr; }
 

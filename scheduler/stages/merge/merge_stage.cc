@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "merge/merge.h"
 #include "scheduler/solid/full_cubes.h"
 
@@ -71,13 +72,16 @@ void check_voxels(const BuildJob& job) {
   const GeometryOptions& geometry = job.spec.geometry;
   std::string message = "none of the " + std::to_string(job.report.triangles) +
                         " triangles near the grid sets a voxel";
-  if (geometry.thin) message += ", because --thin leaves out triangles between the rows";
+  if (geometry.thin)
+    message += ", because " + option_text("thin") + " leaves out triangles between the rows";
   if (geometry.cutouts == CutoutRule::kSkip)
-    message += ", because --cutouts skip leaves out surfaces that alpha hides";
+    message +=
+        ", because " + option_text("cutouts", "skip") + " leaves out surfaces that alpha hides";
   const std::string& scene = geometry.scenes.front();
   if (!job.spec.run.allow_empty)
-    throw Error(ErrorCode::kInvalidInput,
-                scene + ": " + message + "; --allow-empty writes a file without voxels");
+    throw Error(ErrorCode::kInvalidInput, scene + ": " + message + "; " +
+                                              option_text("allow_empty") +
+                                              " writes a file without voxels");
   job.context.progress.warn_of_input(
       {"no-voxels", scene, message + "; the file will have no nodes"});
 }

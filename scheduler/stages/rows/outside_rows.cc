@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "scheduler/solid/row_sums.h"
 #include "scheduler/stages/ingest/read_pieces.h"
 
@@ -51,7 +52,8 @@ class LeavingPiece {
                   where_ +
                       "a triangle that sample rows of the solid can cross has a vertex 2^32 or "
                       "more voxels away from the grid's low corner: expected less than 2^32 voxels "
-                      "on each axis (--bounds)");
+                      "on each axis (" +
+                      option_text("bounds") + ")");
     FixedTriangle& triangle = triangles_.emplace_back();
     for (int i = 0; i < 3; ++i)
       for (int a = 0; a < 3; ++a) triangle.v[i][a] = static_cast<int64_t>(u[i][a]);

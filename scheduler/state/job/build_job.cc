@@ -3,6 +3,7 @@
 #include <exception>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 
 namespace voxdag {
 namespace {
@@ -76,7 +77,8 @@ bool BuildJob::has_rows() const {
     throw Error(ErrorCode::kCorrupt,
                 work.rows_path() +
                     ": the sample rows of this solid are missing or damaged: start "
-                    "over with --restart");
+                    "over with " +
+                    option_text("restart"));
   return true;
 }
 
@@ -88,9 +90,10 @@ void BuildJob::commit_best_effort() {
 }
 
 void BuildJob::refuse(const std::string& difference) const {
-  throw Error(ErrorCode::kInvalidInput,
-              "the work folder " + work.path() + " holds another job: " + difference +
-                  "; give another folder (--work) or start over (--restart)");
+  throw Error(ErrorCode::kInvalidInput, "the work folder " + work.path() +
+                                            " holds another job: " + difference +
+                                            "; give another folder (" + option_text("work") +
+                                            ") or start over (" + option_text("restart") + ")");
 }
 
 }  // namespace voxdag
