@@ -85,9 +85,9 @@ void check_empty(BuildJob& job, uint64_t declared) {
     scenes += (scenes.empty() ? "" : ", ") + scene;
   if (!job.spec.run.allow_empty) {
     for (const Warning& warning : job.store->warnings()) message += "; " + warning.text();
-    throw Error(ErrorCode::kInvalidInput,
-                scenes + ": " + message + "; " + option_text("allow_empty") +
-                    " writes a file without voxels");
+    throw Error(ErrorCode::kInvalidInput, scenes + ": " + message + "; " +
+                                              option_text("allow_empty") +
+                                              " writes a file without voxels");
   }
   job.context.progress.warn_of_input(
       {"empty-scene", scenes, message + "; the file will have no nodes"});
@@ -268,8 +268,23 @@ bool recover(BuildJob& job, const Error& damage, bool& has_restarted) {
   return true;
 }
 
+VoxelCounts voxel_counts(const BuildReport& report) {
+  return {.voxels = report.merge.voxels, .svo_nodes = report.merge.svo_nodes};
+}
+
+// Writes the frame of the levels to the work folder, so that the service can show the levels while
+// the attributes are made. The file is not synced: readers check its checksums.
+void write_frame(BuildJob& job, const GlobalFileWriter& out) {
+  if (!job.spec.geometry.attributes.any() || job.report.merge.voxels == 0) return;
+  const GlobalFileFrame frame = out.frame(voxel_counts(job.report));
+  const auto file = job.context.files.create(job.work.frame_path());
+  file->write_at(0, frame.header);
+  file->write_at(frame.header.size(), frame.table);
+}
+
 // Runs the stages merge and reorder: writes all levels to `out`.
 void write_levels(BuildJob& job, GlobalFileWriter& out) {
+  job.work.remove_frame();  // it does not fit a file that is being written
   if (job.spec.geometry.order == OrderName::kHash) return merge_artifacts(job, out);
   GlobalFileWriter merged(job.context.files, job.work.merged_path(), job.report.grid,
                           job.report.hash_bits);
@@ -321,6 +336,7 @@ bool merge_and_publish(BuildJob& job, bool& has_restarted, double start_s) {
     GlobalFileWriter out(job.context.files, job.report.output, job.report.grid,
                          job.report.hash_bits);
     write_levels(job, out);
+    write_frame(job, out);
     reads_scene = true;
     attributes.add_to(out);
     reads_scene = false;

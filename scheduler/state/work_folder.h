@@ -55,6 +55,11 @@ class WorkFolder {
   std::string colors_path() const { return path_ + "/colors.vddurable"; }
   // The merge's levels in a build that reorders them. The file has the name with ".partial" added.
   std::string merged_path() const { return path_ + "/merged.vdag"; }
+  // The frame of the output file's levels (GlobalFileFrame: the header page, then the checksum
+  // table), while the attribute sections are made. With it, the service shows the levels in
+  // OUT.partial.
+  std::string frame_path() const { return frame_path(path_); }
+  static std::string frame_path(const std::string& folder) { return folder + "/frame.vddurable"; }
   std::string scratch_path() const { return path_ + "/merge"; }
   // Folder that a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
@@ -91,7 +96,13 @@ class WorkFolder {
   }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
-  void remove_merged() { remove_silently(merged_path() + ".partial"); }
+  // Removes the frame of the levels. Errors are ignored.
+  void remove_frame() { remove_silently(frame_path()); }
+  // Removes the levels of a build that reorders them, and the frame. Errors are ignored.
+  void remove_merged() {
+    remove_silently(merged_path() + ".partial");
+    remove_frame();
+  }
   // Removes all files of voxdag, and the folder if it is empty afterwards. Errors are ignored,
   // because remaining files only cost space.
   void remove();

@@ -419,6 +419,19 @@ bool is_partial_global_file(const ReadableFile& file) {
   return is_global_file(file) || begins_with(file, std::string(kPageBytes, '\0'));
 }
 
+GlobalFileFrame GlobalFileWriter::frame(const VoxelCounts& counts) const {
+  const State& s = *state_;
+  if (s.level_open || s.placed || s.section_open || !s.sections.empty() || !s.complete())
+    throw Error(ErrorCode::kCorrupt,
+                s.path + ": expected all levels and no attribute section: found " +
+                    std::to_string(s.levels.size()) + " of " + std::to_string(s.brick_level() + 1) +
+                    " levels and " + std::to_string(s.sections.size()) + " sections");
+  const std::vector<uint64_t> checksums = s.block_checksums.values();
+  const auto table = std::as_bytes(std::span(checksums));
+  const HeaderPage header = s.header(counts, table);
+  return {{header.bytes().begin(), header.bytes().end()}, {table.begin(), table.end()}};
+}
+
 GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned threads,
                                          const CancelToken& cancel) {
   State& s = *state_;

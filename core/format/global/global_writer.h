@@ -62,6 +62,13 @@ struct GlobalFileProgress {
   std::vector<uint64_t> checksums;  // one for each checksum block; the last block may be partial
 };
 
+// The header page and the checksum table of a file without attribute sections, from which a reader
+// can read the levels of a partial file (GlobalFileWriter::frame()).
+struct GlobalFileFrame {
+  std::vector<std::byte> header;
+  std::vector<std::byte> table;
+};
+
 // True if the file begins with the magic of a global file.
 bool is_global_file(const ReadableFile& file);
 // True if it is possible that `file` is a complete or incomplete global file: it begins with the
@@ -125,6 +132,10 @@ class GlobalFileWriter {
   void append(std::span<const std::byte> bytes);
   uint64_t section_bytes() const;  // bytes of the open section so far
   void end_section(const GlobalAttribute& attribute);
+
+  // Returns the header page and the checksum table that the file would have without attribute
+  // sections. Call it after the last level and before the first section.
+  GlobalFileFrame frame(const VoxelCounts& counts) const;
 
   // Writes checksums and header, syncs the file, and reads it back to verify it. Returns the size
   // and the SHA-256 of the file.

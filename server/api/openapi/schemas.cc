@@ -269,6 +269,11 @@ void add_manifests(Json& all) {
   members = manifest_members();
   members.push_back({"built", count()});
   members.push_back({"total", count()});
+  members.push_back(
+      optional("merged",
+               described("true if the tiles are the complete DAG, for which the job still computes "
+                         "colors or other attributes",
+                         boolean())));
   all["PartialManifest"] = object(members);
 }
 

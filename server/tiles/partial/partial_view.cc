@@ -155,6 +155,7 @@ void PartialView::restart() {
   cubes_ = {};
   frame_ = nullptr;
   nodes_.clear();
+  merged_.reset();
   is_worthless_ = !answers_.clear();
 }
 
@@ -176,18 +177,38 @@ void PartialView::find_frame(const JobFolder& folder, uint64_t resolution) {
   frame_ = read_frame(files_, folder, resolution);
 }
 
+nlohmann::ordered_json PartialView::make_manifest(const TileSource& tiles,
+                                                  std::optional<uint64_t> root) const {
+  nlohmann::ordered_json manifest = manifest_of(tiles.dag(), tiles.digest(), {}, root);
+  manifest.update(frame_);
+  manifest["built"] = cubes_.built();
+  manifest["total"] = cubes_.total();
+  return manifest;
+}
+
 void PartialView::update_tiles(const JobFolder& folder, uint64_t resolution) {
   if (tiles_version_ == version_) return;
   const ReadLimiter::Charge charge(limiter_);
   find_frame(folder, resolution);
   const uint32_t levels = levels_of_resolution(resolution);
+  if (merged_ && !merged_->is_broken() && !merged_->was_overwritten()) {
+    tiles_version_ = version_;
+    return;
+  }
+  if (const auto merged = MergedLevels::open(files_, folder, levels)) {
+    nlohmann::ordered_json manifest = make_manifest(*merged, uint64_t{0});
+    manifest["built"] = manifest["total"];  // rows of built subvolumes may not be on the disk yet
+    manifest["merged"] = true;
+    merged->set_manifest(manifest.dump());
+    merged_ = merged;
+    nodes_.clear();
+    tiles_version_ = version_;
+    return answers_.set_tiles(merged);
+  }
+  merged_.reset();
   const auto root = nodes_.add(cubes_, levels);
   auto tiles = std::make_shared<PartialTileSource>(nodes_.dag(), levels, nodes_.digest());
-  nlohmann::ordered_json manifest = manifest_of(tiles->dag(), tiles->digest(), {}, root);
-  manifest.update(frame_);
-  manifest["built"] = cubes_.built();
-  manifest["total"] = cubes_.total();
-  tiles->set_manifest(manifest.dump());
+  tiles->set_manifest(make_manifest(*tiles, root).dump());
   tiles_version_ = version_;
   answers_.set_tiles(std::move(tiles));
 }

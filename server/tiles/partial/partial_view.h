@@ -1,4 +1,5 @@
-// A coarse view of the subvolumes that one job has built so far, as a list and as a DAG.
+// A coarse view of the subvolumes that one job has built so far, as a list and as a DAG. Once the
+// job has merged all levels, the DAG is the job's complete DAG, without colors.
 //
 //  1. At most once per second, the thread of one request reads the job's folder. Other requests
 //     get the previous answer. Reading and converting take at most a twentieth of a core.
@@ -19,6 +20,7 @@
 #include "core/io/file_system.h"
 #include "server/jobs/protocol/job_folder.h"
 #include "server/tiles/partial/coarse_cubes.h"
+#include "server/tiles/partial/merged_levels.h"
 #include "server/tiles/partial/partial_dag.h"
 #include "server/tiles/tile_source.h"
 
@@ -121,6 +123,7 @@ class PartialView {
   void update_json(uint64_t resolution);
   void update_tiles(const JobFolder& folder, uint64_t resolution);
   void find_frame(const JobFolder& folder, uint64_t resolution);
+  nlohmann::ordered_json make_manifest(const TileSource& tiles, std::optional<uint64_t> root) const;
 
   FileSystem& files_;
   const std::string job_;
@@ -134,6 +137,7 @@ class PartialView {
   bool has_failed_ = false;       // true if the last read failed
   nlohmann::ordered_json frame_;  // the manifest's constant members; null before the plan exists
   GrowingDag nodes_;
+  std::shared_ptr<const MergedLevels> merged_;  // null until the levels are merged
   // Values of version_ for which the list, the tiles and the frame were updated last.
   uint64_t json_version_ = 0, tiles_version_ = 0, frame_version_ = 0;
 };

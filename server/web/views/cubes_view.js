@@ -31,6 +31,8 @@ export class CubesView {
     this.element =
         h("div", {class: "cubes-view"}, this.canvas,
           h("div", {class: "split"}, this.note, this.turner));
+    this.count = undefined;  // the text about the built subvolumes
+    this.colorText = "";
     this.setEmpty(true);
     this.sayWhyEmpty(false, false);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -46,6 +48,8 @@ export class CubesView {
       if (!this.cubes.length) this.sayWhyEmpty(hasEnded(job.state), !total || key === this.key);
     };
     sayIfEmpty();
+    this.colorText = colorText(job);
+    this.showNote();
     if (!total || key === this.key || this.fetching) return;
     const waitMs = this.nextFetchMs - performance.now();
     if (waitMs > 0) {
@@ -85,9 +89,15 @@ export class CubesView {
     this.setEmpty(this.cubes.length === 0);
     this.order();
     this.draw();
-    const text = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
-    setText(this.note, text);
-    this.canvas.setAttribute("aria-label", text);
+    this.count = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
+    this.showNote();
+  }
+
+  // Shows how many subvolumes are built and, once they are, the progress of their colors.
+  showNote() {
+    if (this.count === undefined) return;
+    setText(this.note, this.count + this.colorText);
+    this.canvas.setAttribute("aria-label", this.count + this.colorText);
   }
 
   setEmpty(empty) {
@@ -240,6 +250,12 @@ export class CubesView {
       if (cube.edge * size >= kMinOutlinePx) pen.stroke();
     });
   }
+}
+
+// Returns the progress of the colors of a running job; "" in all other stages.
+function colorText({state, progress}) {
+  if (state !== "running" || progress?.stage !== "color" || !progress.total) return "";
+  return `. Colors: ${Math.floor(100 * progress.done / progress.total)} % of the regions are ready`;
 }
 
 // Returns the Morton code of a position. A coordinate has up to 17 bits, so a double represents the

@@ -1,6 +1,7 @@
 // The viewer of a running job. It draws the partial result from the coarse bricks of the built
 // subvolumes, and the wireframe of all subvolumes. The partial result grows while it is viewed;
-// fetched tiles remain valid.
+// fetched tiles remain valid. While the job computes colors, the partial result is the complete DAG
+// without colors.
 
 import {authorization, getJson, sleep} from "../../lib/api.js";
 import {announce} from "../../lib/dom.js";
@@ -55,7 +56,7 @@ export async function watchJob({job, place, budgetBytes, showPicture, showTools,
     wires = viewer.overlay = new SubvolumeWires(canvas, () => viewer.schedule());
     banner = new Banner(wires);
     canvas.parentElement.append(banner.element);
-    banner.show(job, manifest);
+    banner.show(job, manifest, manifest.merged);
     await started;
     window.voxdagViewer = {renderer, source, camera: viewer.camera, viewer, wires, running: true};
     rests = await follow({path, source, renderer, banner, wires, signal: ended.signal});
@@ -134,7 +135,7 @@ class SubvolumeList {
 // result, for example after a restart of the service. Resolves to true if the caller must pause
 // before it follows the job again, because the reason for ending may recur.
 async function follow({path, source, renderer, banner, wires, signal}) {
-  const {digest} = renderer.info, wasEmpty = !renderer.info.root;
+  const {digest, merged: isMerged} = renderer.info, wasEmpty = !renderer.info.root;
   const subvolumes = new SubvolumeList(path);
   let state = null, isArriving = false, pauseMs = kPauseMs;
   while (!signal.aborted) {
@@ -165,7 +166,7 @@ async function follow({path, source, renderer, banner, wires, signal}) {
     }
     if (job && await subvolumes.update(job, signal))
       wires.show(subvolumes.list, state === "running");
-    banner.show(job, subvolumes.list ?? source.info);
+    banner.show(job, subvolumes.list ?? source.info, isMerged);
     // Continues with longer pauses if the job has ended or the service does not answer: the job may
     // be retried, and the service may come back.
     pauseMs = manifest ? kPauseMs : Math.min(kMaxPauseMs, 1.5 * pauseMs);
