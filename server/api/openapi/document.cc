@@ -119,24 +119,42 @@ Json describe(const Answer& answer) {
   return json;
 }
 
-bool has_only_id_parameter(const Route& route) {
-  const auto streams = [](const Answer& answer) {
-    return answer.contents.size() == 1 && answer.contents[0].type == "text/event-stream";
-  };
-  return path_names(route) == std::vector<std::string>{"id"} &&
-         std::none_of(route.query.begin(), route.query.end(),
-                      [](const Parameter& parameter) { return parameter.is_required; }) &&
-         std::none_of(route.answers.begin(), route.answers.end(), streams);
-}
+using Names = std::vector<std::string>;
 
-// Returns OpenAPI links for an answer that contains a new job. The links lead to all routes whose
-// only path parameter is the id of a job.
+// Returns the OpenAPI links of an answer that describes one job. The links lead to all routes whose
+// only required parameter is the id of a job.
 Json job_links(const std::vector<Route>& routes) {
   Json links = Json::object();
   for (const Route& route : routes)
-    if (has_only_id_parameter(route))
+    if (path_names(route) == Names{"id"} &&
+        std::ranges::none_of(route.query, &Parameter::is_required))
       links[route.id] = {{"operationId", route.id}, {"parameters", {{"id", "$response.body#/id"}}}};
   return links;
+}
+
+// Returns the OpenAPI links of an answer that describes one export, to all routes of an export. The
+// link of a file leads to the first file.
+Json export_links(const std::vector<Route>& routes) {
+  Json links = Json::object();
+  for (const Route& route : routes) {
+    const Names names = path_names(route);
+    if (names.size() < 2 || names[1] != "export") continue;
+    Json parameters = {{"id", "$request.path.id"}, {"export", "$response.body#/id"}};
+    if (names.size() == 3) parameters[names[2]] = 0;
+    links[route.id] = {{"operationId", route.id}, {"parameters", std::move(parameters)}};
+  }
+  return links;
+}
+
+// Returns the OpenAPI links of an answer: of an answer that creates a job or an export.
+Json links_of(const Route& route, const Answer& answer, const std::vector<Route>& routes) {
+  const auto has = [&](const char* schema) {
+    return route.method == "POST" &&
+           std::ranges::any_of(answer.contents,
+                               [&](const Content& content) { return content.schema == schema; });
+  };
+  if (has("Job") && path_names(route).empty()) return job_links(routes);
+  return has("Export") ? export_links(routes) : Json::object();
 }
 
 std::set<int> problems_of(const Route& route) {
@@ -149,10 +167,8 @@ Json describe_answers(const Route& route, const std::vector<Route>& routes) {
   Json answers = Json::object();
   for (const Answer& answer : route.answers) {
     Json& json = answers[std::to_string(answer.status)] = describe(answer);
-    const bool creates_job =
-        std::any_of(answer.headers.begin(), answer.headers.end(),
-                    [](const Parameter& header) { return header.name == "Location"; });
-    if (creates_job) json["links"] = job_links(routes);
+    if (Json links = links_of(route, answer, routes); !links.empty())
+      json["links"] = std::move(links);
   }
   for (const int status : problems_of(route))
     answers[std::to_string(status)] = reference("responses", "E" + std::to_string(status));
