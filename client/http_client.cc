@@ -110,6 +110,11 @@ struct HttpClient::Impl {
   }
 
   ClientResponse check(const httplib::Result& result) const {
+    if (!result && result.error() == httplib::Error::SSLServerVerification)
+      throw Error(ErrorCode::kIo,
+                  "server " + url +
+                      ": its certificate is not trusted, or is for another name: expected a "
+                      "certificate that the system or the given CA file trusts");
     if (!result)
       throw Error(ErrorCode::kIo, "server " + url + ": " + httplib::to_string(result.error()) +
                                       ": expected an answer");

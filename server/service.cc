@@ -29,9 +29,11 @@ ServerConfig checked(ServerConfig config, FileSystem& files, const Log& log) {
   // At least half of the file descriptors must be left for jobs, transfers and databases.
   const uint64_t sockets = max_open_files() / 2;
   if (config.http.limits.max_connections > sockets) {
-    log("connections are limited to " + std::to_string(sockets) + ", not " +
-        std::to_string(config.http.limits.max_connections) +
-        ", because they may use half of the open files of this process (ulimit -n, LimitNOFILE)");
+    log({"connections are limited to " + std::to_string(sockets) + ", not " +
+             std::to_string(config.http.limits.max_connections) +
+             ", because they may use half of the open files of this process (ulimit -n, "
+             "LimitNOFILE)",
+         LogLevel::kWarning});
     config.http.limits.max_connections = sockets;
   }
   return config;
@@ -71,7 +73,7 @@ std::string shown(const std::string& path) {
 Service::Service(ServerConfig config, FileSystem& files, Log log)
     : config_(checked(std::move(config), files, log)),
       files_(files),
-      log_([log = std::move(log)](const std::string& line) { log(printable_line(line)); }),
+      log_([log = std::move(log)](const LogEntry& entry) { log(printable_entry(entry)); }),
       steps_(log_, config_.before_step),
       lock_(lock_folder(files, config_.data_folder)),
       disk_(files, config_.data_folder, config_.jobs.min_free_disk_bytes),
@@ -91,8 +93,10 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
                disk_,   dispatcher_, webhooks_, metrics_, draining_} {
   if (!config_.token_file.empty() && config_.http.certificate_file.empty() &&
       !is_loopback_name(config_.http.address))
-    log_("warning: tokens travel in plain text: " + url() +
-         " is open to the network without TLS. Use --certificate and --key, or a reverse proxy");
+    log_(
+        {"warning: tokens travel in plain text: " + url() +
+             " is open to the network without TLS. Use --certificate and --key, or a reverse proxy",
+         LogLevel::kWarning});
   steps_.run("remove the folders of old plans", [this] { remove_plans(files_, config_); });
   add_job_routes(router_);
   add_result_routes(router_);
@@ -172,28 +176,44 @@ Response Service::answer(Request& request) {
   } catch (const std::exception& error) {
     const Problem problem = public_problem(error);
     if (problem.detail != error.what())  // clients do not receive this text
-      log_("request " + request.id + " " + request.method + " failed: " + error.what());
+      log_({"request " + request.id + " " + request.method + " failed: " + error.what(),
+            LogLevel::kError});
     if (!problem.log_text.empty())
-      log_("request " + request.id + " " + request.method + " failed: " + problem.log_text);
+      log_({"request " + request.id + " " + request.method + " failed: " + problem.log_text,
+            LogLevel::kError});
     response = problem_response(problem);
   } catch (...) {
-    log_("request " + request.id + " " + request.method + " failed: an unknown exception");
+    log_({"request " + request.id + " " + request.method + " failed: an unknown exception",
+          LogLevel::kError});
     response = problem_response(public_problem(std::exception()));
   }
   access_.cross_origin().add_headers(request, response);
   if (!router_.is_documented(request, response.status))
-    log_("request " + request.id + " " + request.method +
-         ": the OpenAPI document lacks the status " + std::to_string(response.status));
+    log_({"request " + request.id + " " + request.method +
+              ": the OpenAPI document lacks the status " + std::to_string(response.status),
+          LogLevel::kError});
   record(request, response.status, start_s);
   return response;
 }
 
 void Service::record(const Request& request, int status, double start_s) {
-  metrics_.count_request(status, wall_seconds() - start_s);
-  if (request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS") return;
-  log_("audit " + request.method + " " + shown(request.target.path) + " status=" +
-       std::to_string(status) + " who=" + (request.caller.empty() ? "-" : request.caller) +
-       " from=" + request.peer + " request=" + request.id);
+  const double duration_s = wall_seconds() - start_s;
+  metrics_.count_request(status, duration_s);
+  const bool is_read =
+      request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS";
+  if (is_read && !config_.access_log) return;
+  const LoggedRequest logged{.id = request.id,
+                             .method = request.method,
+                             .path = shown(request.target.path),
+                             .status = status,
+                             .who = request.caller.empty() ? "-" : request.caller,
+                             .from = request.peer,
+                             .duration_s = duration_s};
+  LogEntry entry((is_read ? "access " : "audit ") + logged.method + " " + logged.path +
+                 " status=" + std::to_string(status) + " who=" + logged.who +
+                 " from=" + logged.from + " request=" + logged.id);
+  entry.request = logged;
+  log_(entry);
 }
 
 }  // namespace voxdag::server

@@ -19,8 +19,9 @@ namespace voxdag::server {
 class Service {
  public:
   // Checks the configuration, locks the data folder, opens the databases, resumes the jobs of the
-  // previous service, and listens. `log` receives failures, and a line for every request that is
-  // not GET or HEAD, with the name of the caller's token. Throws Error.
+  // previous service, and listens. `log` receives failures, and an entry for every request that
+  // changes something, with the name of the caller's token; with ServerConfig::access_log, also an
+  // entry for every other request. The texts of the entries are printable. Throws Error.
   Service(ServerConfig config, FileSystem& files, Log log);
 
   int port() const { return http_.port(); }
@@ -36,7 +37,7 @@ class Service {
   // Runs until the service stops.
   void clean_up_periodically();
   Response answer(Request& request);
-  // Counts the request. Logs it unless its method is GET or HEAD.
+  // Counts the request. Logs it, unless it only reads and there is no access log.
   void record(const Request& request, int status, double start_s);
 
   const ServerConfig config_;

@@ -28,7 +28,7 @@ std::string file_name_of(const std::string& path) { return path.substr(path.rfin
 
 ViewService::ViewService(const std::string& path, int port, FileSystem& files, Log log)
     : path_(path),
-      log_([log = std::move(log)](const std::string& line) { log(printable_line(line)); }),
+      log_([log = std::move(log)](const LogEntry& entry) { log(printable_entry(entry)); }),
       open_sources_(files, kMaxOpen),
       tiles_(kMaxConcurrentTiles, kMaxConcurrentTiles),
       access_(ServerConfig{}, files),

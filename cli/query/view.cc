@@ -36,9 +36,10 @@ void open_in_browser(const std::string& url) {
 }
 
 void run(const ViewCommand& command, CommandContext& context) {
-  server::ViewService service(
-      command.input, command.port, context.files,
-      [](const std::string& line) { std::fprintf(stderr, "voxdag: %s\n", line.c_str()); });
+  server::ViewService service(command.input, command.port, context.files,
+                              [](const server::LogEntry& entry) {
+                                std::fprintf(stderr, "voxdag: %s\n", entry.message.c_str());
+                              });
   if (command.json)
     print_json_line(nlohmann::ordered_json{{"url", service.url()}});
   else

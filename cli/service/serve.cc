@@ -7,7 +7,8 @@
 
 #include "cli/output.h"
 #include "cli/service/run_until_canceled.h"
-#include "core/base/text.h"
+#include "core/base/clock.h"
+#include "core/fields/field.h"
 #include "server/api/access/tokens.h"
 #include "server/jobs/process/job_process.h"
 #include "server/service.h"
@@ -17,7 +18,7 @@ namespace {
 
 struct ServeCommand {
   server::ServerConfig options;  // from the command line
-  std::string config_file;
+  std::string config_file, log_format;
   bool json = false;
 };
 
@@ -27,12 +28,13 @@ struct TokenCommand {
   bool json = false;
 };
 
-// Writes one line to standard error. Thread-safe.
-void log_line(const std::string& line) {
-  static std::mutex mutex;
-  std::lock_guard lock(mutex);
-  std::fprintf(stderr, "%s %s\n", utc_text(time(nullptr), "%Y-%m-%dT%H:%M:%SZ").c_str(),
-               line.c_str());
+// Writes entries to standard error, one line each. Thread-safe.
+server::Log log_to_stderr(server::LogFormat format) {
+  return [format](const server::LogEntry& entry) {
+    static std::mutex mutex;
+    const std::lock_guard lock(mutex);
+    std::fprintf(stderr, "%s\n", server::log_line(format, entry, unix_seconds()).c_str());
+  };
 }
 
 // Returns the settings of the service from the configuration file and the command line, whose
@@ -49,6 +51,8 @@ server::ServerConfig settings(const ServeCommand& command, const Command& line, 
   if (given("--key")) config.http.key_file = command.options.http.key_file;
   config.adopt = command.options.adopt;
   if (given("--scenes")) config.scene_roots = command.options.scene_roots;
+  if (given("--log-format")) config.log_format = *enum_of<server::LogFormat>(command.log_format);
+  if (given("--access-log")) config.access_log = command.options.access_log;
   return config;
 }
 
@@ -56,17 +60,19 @@ void serve(const ServeCommand& command, const Command& line, CommandContext& con
   // Makes new files private to the user who runs the service. Otherwise all users of the machine
   // could read scenes and results, not only clients with a token.
   umask(0077);
-  server::Service service(settings(command, line, context.files), context.files, log_line);
-  log_line("listening on " + service.url());
+  const server::ServerConfig config = settings(command, line, context.files);
+  const server::Log log = log_to_stderr(config.log_format);
+  server::Service service(config, context.files, log);
+  log("listening on " + service.url());
   if (command.json) print_json_line(nlohmann::ordered_json{{"url", service.url()}});
   std::fflush(stdout);
   run_until_canceled(
       context.cancel, [&] { service.run(); },
       [&] {
-        log_line("stopping: waiting for builds to reach a checkpoint and answers to finish");
+        log("stopping: waiting for builds to reach a checkpoint and answers to finish");
         service.stop();
       });
-  log_line("stopped");
+  log("stopped");
 }
 
 void declare(Command& command, TokenCommand& state) {
@@ -113,6 +119,11 @@ void add_serve_commands(CommandLine& line) {
   command.option("--key", options.http.key_file, "TLS: its key, PEM");
   command.option("--scenes", options.scene_roots,
                  "folder whose scenes jobs may name by path; may be repeated");
+  command
+      .option("--log-format", state->log_format,
+              "format of the log: text (default), or json, one object per line")
+      .one_of(choices_of<server::LogFormat>());
+  command.flag("--access-log", options.access_log, "also log requests that change nothing");
   command.flag("--adopt", options.adopt,
                "make new records of jobs and scenes whose records are lost");
   command.json_flag(state->json, "print the URL as one line of JSON on standard output");

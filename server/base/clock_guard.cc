@@ -27,8 +27,9 @@ bool ClockGuard::has_jumped(double clock_s, double now_s) {
 double ClockGuard::oldest_s(double days, const char* what, const Log& log) {
   const double clock_s = unix_seconds(), now_s = wall_seconds();
   if (has_jumped(clock_s, now_s))
-    log("the clock is far ahead of the time last seen by the service: for a day no " +
-        std::string(what) + " is deleted because of its age");
+    log({"the clock is far ahead of the time last seen by the service: for a day no " +
+             std::string(what) + " is deleted because of its age",
+         LogLevel::kWarning});
   return is_uncertain(now_s) ? 0 : clock_s - days * kSecondsPerDay;
 }
 

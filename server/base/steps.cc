@@ -33,7 +33,7 @@ void Steps::report(const std::string& name, const char* reason) noexcept {
       last_line_ = line;
       last_s_ = wall_seconds();
     }
-    log_(line);
+    log_({line, LogLevel::kError});
   } catch (...) {
     // Writing the log line has failed, so the failure of the step cannot be reported.
   }

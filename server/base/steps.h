@@ -6,10 +6,10 @@
 #include <mutex>
 #include <string>
 
+#include "server/base/log.h"
+
 namespace voxdag::server {
 
-// Writes a line of the log.
-using Log = std::function<void(const std::string& line)>;
 // Called with the name of each step and request handler, before it runs. Tests make it throw.
 using StepHook = std::function<void(const std::string& step)>;
 

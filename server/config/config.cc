@@ -95,6 +95,7 @@ template <class Visitor>
 void fields(Visitor& visit, WebhookOptions& webhooks) {
   visit("allow", webhooks.allow);
   visit("secret_file", webhooks.secret_file);
+  visit("ca_file", webhooks.ca_file);
   visit(Field("max_attempts").range(1, 100), webhooks.max_attempts);
   visit(Field("backoff_s").range(0, 604800), webhooks.backoff_s);
   visit(Field("max_backoff_s").range(0, 604800), webhooks.max_backoff_s);
@@ -141,6 +142,8 @@ void fields(Visitor& visit, ServerConfig& c) {
   });
   visit("retention", c.retention);
   visit("webhooks", c.webhooks);
+  visit("log_format", c.log_format);
+  visit("access_log", c.access_log);
 }
 
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config) {

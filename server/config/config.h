@@ -7,6 +7,7 @@
 
 #include "core/io/file_system.h"
 #include "scheduler/spec/build_spec.h"
+#include "server/base/log.h"
 #include "server/base/steps.h"
 #include "server/http/http_server.h"
 
@@ -57,6 +58,7 @@ struct Retention {
 struct WebhookOptions {
   std::vector<std::string> allow;  // prefixes of the URLs that jobs may name
   std::string secret_file;         // file with the key of signatures; "": no signatures
+  std::string ca_file;             // certificates that https receivers may have; "": the system's
   unsigned max_attempts = 10;
   double backoff_s = 10;  // pause before the second attempt; doubles with each further attempt
   double max_backoff_s = 3600;
@@ -83,6 +85,8 @@ struct ServerConfig {
   TransferLimits transfers;
   Retention retention;
   WebhookOptions webhooks;
+  LogFormat log_format = LogFormat::kText;
+  bool access_log = false;     // the log also has the requests that only read
   bool adopt = false;          // jobs and scenes without records get new records
   StepHook before_step;        // used by tests
   double drain_timeout_s = 5;  // time for requests in progress when the service stops

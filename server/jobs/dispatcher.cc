@@ -82,7 +82,7 @@ void Dispatcher::recover() {
     if (worker.is_running()) running.insert(key);
   const auto pause = [this](unsigned attempt) { return pause_s(config_.jobs, attempt); };
   for (const Job& job : queue_.recover(running, pause))
-    log_("job " + job.id + " " + state_name(job.state));
+    log_({"job " + job.id + " " + state_name(job.state), LogLevel::kInfo, job.id});
 }
 
 void Dispatcher::stop() {
@@ -157,7 +157,7 @@ bool Dispatcher::start_next_job() {
   } catch (const RequestError& error) {
     // The request cannot be read: another version of this program stored it, or its record is
     // damaged.
-    log_("job " + job->id + " failed: " + error.message());
+    log_({"job " + job->id + " failed: " + error.message(), LogLevel::kError, job->id});
     queue_.change(job->id, [&](Job& j) {
       j.state = JobState::kFailed;
       j.finished_s = unix_seconds();
@@ -175,7 +175,7 @@ bool Dispatcher::start_next_job() {
     j.not_before_s = 0;
   });
   try {
-    log_("job " + started.id + " running");
+    log_({"job " + started.id + " running", LogLevel::kInfo, started.id});
     start_worker(started.id, std::make_shared<LiveJob>(needed, std::move(stages)),
                  [this, started](LiveJob& live) { run_job(started, live); });
   } catch (...) {
@@ -244,7 +244,7 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
     end = run_process({{config_.program, "run-job", place.path}, place.log(), config_.jobs.nice},
                       live, kNoTimeLimitS);
   } catch (const std::exception& error) {
-    log_("job " + job.id + ": " + error.what());
+    log_({"job " + job.id + ": " + error.what(), LogLevel::kError, job.id});
     const PublicError seen = public_error(error);
     live.apply(Failure{seen.code, seen.text});
   }
@@ -267,8 +267,9 @@ void Dispatcher::record_outcome(const Job& job, LiveJob& live, const ChildProces
     if (stopping()) return;
   }
   if (!after) return;
-  log_("job " + job.id + " " + state_name(after->state) +
-       (after->error ? ": " + after->error->code : ""));
+  log_({"job " + job.id + " " + state_name(after->state) +
+            (after->error ? ": " + after->error->code : ""),
+        after->state == JobState::kFailed ? LogLevel::kError : LogLevel::kInfo, job.id});
   if (after->state == JobState::kSuspended || after->state == JobState::kFailed) stop_tasks(job.id);
   remove_work(job.id);
   on_run_ended_(*after);
@@ -325,7 +326,7 @@ void Dispatcher::retire_old_jobs() {
     removed += steps_.run("remove old job " + id, [&] {
       try {
         remove(id);
-        log_("job " + id + " removed by the retention rule");
+        log_({"job " + id + " removed by the retention rule", LogLevel::kInfo, id});
       } catch (const RequestError&) {
         // A client has deleted or retried the job.
       }

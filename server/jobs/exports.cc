@@ -313,7 +313,7 @@ void Exports::remove_busy(Entry& entry, std::unique_lock<std::mutex>& lock) {
   lock.unlock();
   try {
     remove_folder(it);
-    log_("export " + it.id + " of job " + it.job + " deleted");
+    log_({"export " + it.id + " of job " + it.job + " deleted", LogLevel::kInfo, it.job});
   } catch (...) {
     lock.lock();
     entry.is_busy = false;  // the next request to delete it tries again
@@ -369,7 +369,7 @@ void Exports::run_one(Entry& entry, std::unique_lock<std::mutex>& lock) {
   const bool is_recorded =
       steps_.run("record the start of export " + it.id, [&] { write_record(it); });
   lock.unlock();
-  log_("export " + it.id + " of job " + it.job + " running");
+  log_({"export " + it.id + " of job " + it.job + " running", LogLevel::kInfo, it.job});
   try {
     if (!is_recorded)
       throw Error(ErrorCode::kIo,
@@ -377,7 +377,7 @@ void Exports::run_one(Entry& entry, std::unique_lock<std::mutex>& lock) {
                   "reason): expected a writable folder of the job");
     end = run_process(it, *live);
   } catch (const std::exception& error) {
-    log_("export " + it.id + " of job " + it.job + ": " + error.what());
+    log_({"export " + it.id + " of job " + it.job + ": " + error.what(), LogLevel::kError, it.job});
     const PublicError seen = public_error(error);
     live->apply(Failure{seen.code, seen.text});
   }
@@ -409,8 +409,9 @@ ChildProcess::End Exports::run_process(const Export& it, LiveJob& live) {
 
 void Exports::finish(Entry& entry, double wall_s, std::unique_lock<std::mutex>& lock) {
   const Export it = entry.it;
-  log_("export " + it.id + " of job " + it.job + " " + name_of(it.state) +
-       (it.error_code.empty() ? "" : ": " + it.error_code));
+  log_({"export " + it.id + " of job " + it.job + " " + name_of(it.state) +
+            (it.error_code.empty() ? "" : ": " + it.error_code),
+        it.error_code.empty() ? LogLevel::kInfo : LogLevel::kError, it.job});
   ++ended_.ended_runs[static_cast<size_t>(it.state)];
   for (const ExportedFile& file : it.result.files) ended_.ended_bytes += file.bytes;
   ended_.ended_wall_s += wall_s;

@@ -43,7 +43,7 @@ void JobFolders::adopt() {
         job.finished_s = unix_seconds();
       }
       queue_.add(job, {}, UINT64_MAX);
-      log_("job " + job.id + " adopted: " + state_name(job.state));
+      log_({"job " + job.id + " adopted: " + state_name(job.state), LogLevel::kInfo, job.id});
     });
   }
 }
@@ -64,7 +64,8 @@ void JobFolders::clean_up() {
         remove_work(entry.name);
     });
   }
-  if (!foreign.empty()) log_("kept, because no job of the queue has this folder:" + foreign);
+  if (!foreign.empty())
+    log_({"kept, because no job of the queue has this folder:" + foreign, LogLevel::kWarning});
 }
 
 void JobFolders::remove_work(const std::string& id) {
@@ -93,14 +94,15 @@ void JobFolders::remove_marked(const std::string& id) {
   remove_entries(files_, marked);
   if (queue_.find(id)) queue_.remove(id);
   remove_tree(files_, marked);
-  log_("job " + id + " deleted");
+  log_({"job " + id + " deleted", LogLevel::kInfo, id});
 }
 
 void JobFolders::finish_deletion(const std::string& id) {
   const auto job = queue_.find(id);
   if (!job || (has_ended(job->state) && !files_.exists(of(id).path))) return remove_marked(id);
   remove_tree(files_, of(id).path + kDeleted);
-  log_("job " + id + ": removed the remains of an interrupted deletion; the job is kept");
+  log_({"job " + id + ": removed the remains of an interrupted deletion; the job is kept",
+        LogLevel::kInfo, id});
 }
 
 }  // namespace voxdag::server

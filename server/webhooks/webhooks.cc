@@ -86,6 +86,7 @@ Webhooks::Webhooks(const ServerConfig& config, FileSystem& files, JobQueue& queu
                       "': expected http://, because the HTTP library of this build (cpp-httplib) "
                       "has no TLS");
   }
+  if (!options_.ca_file.empty()) files.open_read(options_.ca_file);  // throws if it is missing
   if (!options_.secret_file.empty()) secret_ = read_secret(files, options_.secret_file);
   // If a backup of the queue was restored, its events have smaller numbers than the last one.
   last_event_ = std::min(store_.last_event(), ended_jobs_.last_number());
@@ -219,7 +220,8 @@ void Webhooks::collect(const JobEnd& end) {
     delivery.ended_s = delivery.created_s;
     delivery.error =
         "too many pending deliveries: expected less than " + std::to_string(kMaxPending);
-    log_("webhook " + delivery.id + " of job " + delivery.job + " failed: " + delivery.error);
+    log_({"webhook " + delivery.id + " of job " + delivery.job + " failed: " + delivery.error,
+          LogLevel::kError, delivery.job});
   }
   store_.add(delivery);
   count_end(delivery);
@@ -263,6 +265,7 @@ void Webhooks::start(const Delivery& delivery) {
   attempt->deadline_s = wall_seconds() + options_.timeout_s;
   client::ClientOptions options;
   options.url = delivery.origin;
+  options.ca_file = options_.ca_file;
   options.timeout_s = options_.timeout_s;
   options.connect_timeout_s = std::min(options_.timeout_s, kMaxConnectS);
   try {
@@ -360,7 +363,8 @@ void Webhooks::record(Attempt& attempt) {
   store_.update(changed);
   ++ended_attempts_;
   count_end(changed);
-  if (!changed.error.empty()) log_(what + " failed: " + changed.error);
+  if (!changed.error.empty())
+    log_({what + " failed: " + changed.error, LogLevel::kWarning, delivery.job});
 }
 
 void Webhooks::count_end(const Delivery& delivery) {
@@ -374,7 +378,8 @@ void Webhooks::fail(Delivery delivery, const std::string& reason) {
   delivery.error = reason;
   store_.update(delivery);
   count_end(delivery);
-  log_("webhook " + delivery.id + " of job " + delivery.job + " failed: " + reason);
+  log_({"webhook " + delivery.id + " of job " + delivery.job + " failed: " + reason,
+        LogLevel::kError, delivery.job});
 }
 
 void Webhooks::forget_deleted_jobs() {

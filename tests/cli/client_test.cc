@@ -180,6 +180,36 @@ TEST_F(Client, CutsTheTableAtTheWidthOfTheTerminal) {
     EXPECT_LE(line.size(), kColumns + 3) << line;  // with two more bytes of the ellipsis, and CR
 }
 
+// With --log-format json, each line of the log is a JSON object. With --access-log, requests that
+// only read are in the log.
+TEST_F(Client, ServesWithALogOfJson) {
+  start_server({"--log-format", "json", "--access-log"});
+  const std::string id = submit("16", {"--wait"});
+  EXPECT_EQ(state(id), "succeeded");
+  EXPECT_EQ(server_->stop(), 0);
+  std::istringstream lines(server_->log());
+  std::map<std::string, int> count;
+  for (std::string line; std::getline(lines, line);) {
+    const Json entry = Json::parse(line, nullptr, false);
+    ASSERT_TRUE(entry.is_object()) << line;
+    EXPECT_EQ(entry.at("time").get<std::string>().size(), 24u) << line;
+    const std::string message = entry.at("message");
+    if (entry.value("job", "") == id) ++count[message];
+    if (!entry.contains("request")) continue;
+    EXPECT_EQ(entry["level"], "info");
+    ++count[message.substr(0, message.find(' '))];
+    if (entry["request"]["method"] == "GET" && entry["request"]["path"] == "/api/v1/jobs")
+      ++count["list"];
+  }
+  for (const std::string& expected :
+       {"job " + id + " running", "job " + id + " succeeded", std::string("audit"),
+        std::string("access"), std::string("list")})
+    EXPECT_GE(count[expected], 1) << expected << "\n" << server_->log();
+  EXPECT_NE(server_->log().find("\"stopped\""), std::string::npos);
+  expect_error(2, "--log-format", {"serve", "--log-format", "xml", "--data", "x"});
+  server_.reset();
+}
+
 // A file is uploaded only once. If the server has a part of the file, only the remaining part is
 // sent.
 TEST_F(Client, UploadsTheMissingPart) {

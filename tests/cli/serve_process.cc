@@ -48,7 +48,7 @@ void ServeProcess::wait_until_it_listens() {
     const size_t at = text.find(words);
     if (at != std::string::npos && text.find('\n', at) != std::string::npos) {
       const size_t begin = at + words.size();
-      url_ = text.substr(begin, text.find_first_of(" \n", begin) - begin);
+      url_ = text.substr(begin, text.find_first_of(" \"\n", begin) - begin);
       return;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));

@@ -436,7 +436,7 @@ TEST_F(Api, DescribesItself) {
 // A second service with the same data folder is refused, because it would start the same jobs.
 TEST_F(Api, LocksItsDataFolder) {
   start();
-  EXPECT_THROW(Service(config_, system_files(), [](const std::string&) {}), Error);
+  EXPECT_THROW(Service(config_, system_files(), [](const LogEntry&) {}), Error);
 }
 
 // The log reports each request that changes something, with the name of the client. It does not
@@ -450,6 +450,19 @@ TEST_F(Api, WritesAnAuditLog) {
             std::string::npos)
       << text;
   EXPECT_EQ(text.find("audit GET"), std::string::npos);
+}
+
+TEST_F(Api, WritesAnAccessLog) {
+  config_.access_log = true;
+  start();
+  http_->get("/api/v1/scenes?limit=1");
+  http_->get("/none%20access%20GET");
+  const std::string text = log();
+  EXPECT_NE(text.find("access GET /api/v1/scenes status=200 who=local from=127.0.0.1 request="),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("access GET /none%20access%20GET status=404 who="), std::string::npos)
+      << text;
 }
 
 // Errors of jobs name options as the members of the request, not as the command line spells them.

@@ -33,9 +33,9 @@ class HostileView : public testing::Test {
     if (thread_.joinable()) thread_.join();
   }
   void start() {
-    service_.emplace(path_, 0, system_files(), [this](const std::string& line) {
+    service_.emplace(path_, 0, system_files(), [this](const LogEntry& entry) {
       const std::lock_guard lock(log_mutex_);
-      log_ += line + "\n";
+      log_ += entry.message + "\n";
     });
     thread_ = std::thread([this] { service_->run(); });
     const std::string url = service_->url();

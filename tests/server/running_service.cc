@@ -35,9 +35,9 @@ RunningService::~RunningService() {
 }
 
 void RunningService::start() {
-  service_ = std::make_unique<Service>(config_, *files_, [this](const std::string& line) {
+  service_ = std::make_unique<Service>(config_, *files_, [this](const LogEntry& entry) {
     std::lock_guard lock(log_mutex_);
-    log_ += line + "\n";
+    log_ += entry.message + "\n";
   });
   thread_ = std::thread([this] { service_->run(); });
   http_ = std::make_unique<HttpClient>(ClientOptions{service_->url(), "", "", 300});

@@ -195,7 +195,7 @@ TEST(OverwrittenFile, IsGoneWhileItsTilesAreMade) {
                       .c_str()),
       0);
   ChangingFiles files(system_files());
-  ViewService service(path, 0, files, [](const std::string&) {});
+  ViewService service(path, 0, files, [](const LogEntry&) {});
   std::thread thread([&] { service.run(); });
   {
     HttpClient http(ClientOptions{service.url().substr(0, service.url().size() - 1), "", "", 60});

@@ -280,7 +280,7 @@ class View : public testing::Test {
     ASSERT_EQ(std::system(command.c_str()), 0);
   }
   void start() {
-    service_.emplace(path_, 0, system_files(), [](const std::string&) {});
+    service_.emplace(path_, 0, system_files(), [](const LogEntry&) {});
     thread_ = std::thread([this] { service_->run(); });
     const std::string url = service_->url();
     http_.emplace(ClientOptions{url.substr(0, url.size() - 1), "", "", 60});

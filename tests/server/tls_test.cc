@@ -2,8 +2,15 @@
 #include <openssl/x509v3.h>
 
 #include <cstdio>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
 
 #include "core/base/error.h"
+#include "server/http/http_server.h"
+#include "server/webhooks/webhook_message.h"
 #include "tests/server/running_service.h"
 
 namespace voxdag::server {
@@ -74,6 +81,106 @@ TEST_F(Tls, EncryptsEverything) {
 
 TEST_F(Tls, RejectsAKeyOfAnotherCertificate) {
   make_certificate(folder_.file("other.pem"), config_.http.key_file);
+  EXPECT_THROW(start(), Error);
+}
+
+// A receiver of webhooks with TLS. It answers all requests with 204.
+class TlsReceiver {
+ public:
+  explicit TlsReceiver(const TemporaryFolder& folder) : certificate_(folder.file("receiver.pem")) {
+    HttpOptions options;
+    options.port = 0;
+    options.certificate_file = certificate_;
+    options.key_file = folder.file("receiver.key");
+    make_certificate(options.certificate_file, options.key_file);
+    server_.emplace(options, [this](Request& request) {
+      std::string body;
+      request.read_body([&](std::string_view piece) {
+        body += piece;
+        return true;
+      });
+      const std::lock_guard lock(mutex_);
+      received_.push_back({request.target.path, request.header("X-Voxdag-Signature"), body});
+      Response response;
+      response.status = 204;
+      return response;
+    });
+    thread_ = std::thread([this] { server_->run(0); });
+  }
+  ~TlsReceiver() {
+    server_->stop();
+    thread_.join();
+  }
+
+  struct Received {
+    std::string target, signature, body;
+  };
+  std::string url(const std::string& path) const {
+    return "https://127.0.0.1:" + std::to_string(server_->port()) + path;
+  }
+  const std::string& certificate() const { return certificate_; }
+  std::vector<Received> received() {
+    const std::lock_guard lock(mutex_);
+    return received_;
+  }
+
+ private:
+  const std::string certificate_;
+  std::mutex mutex_;  // guards received_
+  std::vector<Received> received_;
+  std::optional<HttpServer> server_;
+  std::thread thread_;
+};
+
+class TlsWebhooks : public RunningService {
+ protected:
+  // Starts the service, and returns the id of a job with this webhook.
+  std::string post_with(const std::string& webhook) {
+    config_.webhooks.backoff_s = 0.01;
+    start();
+    EXPECT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
+    return post_job({{"scene", "m.glb"}, {"resolution", 64}, {"webhook", webhook}});
+  }
+  // Waits until the delivery of the job is in this state, and returns the member "webhook".
+  Json until_webhook(const std::string& id, const std::string& state) {
+    Json webhook;
+    EXPECT_TRUE(until([&] { return (webhook = job(id)["webhook"])["state"] == state; })) << webhook;
+    return webhook;
+  }
+};
+
+TEST_F(TlsWebhooks, AreDelivered) {
+  if (!client::supports_https()) GTEST_SKIP() << "cpp-httplib was built without TLS";
+  TlsReceiver receiver(folder_);
+  const std::string secret = "a secret of a test";
+  std::ofstream(folder_.file("secret")) << secret << "\n";
+  config_.webhooks.secret_file = folder_.file("secret");
+  config_.webhooks.allow = {receiver.url("/hooks")};
+  config_.webhooks.ca_file = receiver.certificate();
+  const std::string id = post_with(receiver.url("/hooks/a"));
+  const Json webhook = until_webhook(id, "delivered");
+  EXPECT_EQ(webhook["status"], 204);
+  EXPECT_EQ(webhook["attempts"], 1);
+  const auto received = receiver.received();
+  ASSERT_EQ(received.size(), 1u);
+  EXPECT_EQ(received[0].target, "/hooks/a");
+  EXPECT_EQ(received[0].signature, webhook_signature(secret, received[0].body));
+  EXPECT_EQ(Json::parse(received[0].body)["id"], id);
+}
+
+// A receiver whose certificate is not trusted gets nothing.
+TEST_F(TlsWebhooks, NeedATrustedCertificate) {
+  if (!client::supports_https()) GTEST_SKIP() << "cpp-httplib was built without TLS";
+  TlsReceiver receiver(folder_);
+  config_.webhooks.allow = {receiver.url("/hooks")};
+  config_.webhooks.max_attempts = 2;
+  const Json webhook = until_webhook(post_with(receiver.url("/hooks/a")), "failed");
+  EXPECT_EQ(webhook["attempts"], 2);
+  EXPECT_EQ(webhook["status"], nullptr);
+  EXPECT_NE(webhook["error"].get<std::string>().find("certificate"), std::string::npos) << webhook;
+  EXPECT_TRUE(receiver.received().empty());
+  stop();
+  config_.webhooks.ca_file = folder_.file("none.pem");
   EXPECT_THROW(start(), Error);
 }
 

@@ -359,7 +359,7 @@ TEST_F(WebhookService, EndsAnswersThatAreTooLong) {
 TEST_F(WebhookService, DeliversEndsThatAKilledServiceRecorded) {
   std::filesystem::create_directories(config_.data_folder);
   JobQueue queue(config_.data_folder + "/queue.db");
-  const auto no_log = [](const std::string&) {};
+  const auto no_log = [](const LogEntry&) {};
   { Webhooks first(config_, system_files(), queue, no_log); }
   Job job;
   job.request = R"({"scene":["m.glb"],"resolution":64,"options":{},"webhook":")" +

@@ -33,7 +33,8 @@ class Scenes : public testing::Test {
   }
   std::unique_ptr<SceneStore> make_store(bool adopt) {
     return std::make_unique<SceneStore>(
-        files_, folder_.path(), [this](const std::string& line) { log_ += line + "\n"; }, adopt);
+        files_, folder_.path(), [this](const LogEntry& entry) { log_ += entry.message + "\n"; },
+        adopt);
   }
   std::optional<RequestError> refusal(const std::function<void()>& act) {
     try {
