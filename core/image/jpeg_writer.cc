@@ -72,6 +72,8 @@ struct JpegEncoder {
 
 }  // namespace
 
+bool can_write_jpeg() { return true; }
+
 std::string encode_jpeg(uint32_t width, uint32_t height, std::span<const uint8_t> rgb,
                         std::string_view comment) {
   JpegEncoder encoder;
@@ -83,6 +85,8 @@ std::string encode_jpeg(uint32_t width, uint32_t height, std::span<const uint8_t
   return {reinterpret_cast<const char*>(encoder.bytes), encoder.size};
 }
 #else
+bool can_write_jpeg() { return false; }
+
 std::string encode_jpeg(uint32_t, uint32_t, std::span<const uint8_t>, std::string_view) {
   throw Error(ErrorCode::kInvalidInput,
               "this build has no libjpeg (-DVOXDAG_IMAGES=OFF): expected a PNG file");

@@ -124,7 +124,8 @@ std::vector<query::ViewerFile> viewer_site(const PageContents& contents) {
   std::vector<query::ViewerFile> files = {{name, module}};
   std::string poster;
   if (!contents.poster.empty()) {
-    poster = query::hashed_name("poster", contents.poster, ".png");
+    poster =
+        query::hashed_name("poster", contents.poster, format_of_poster(contents.poster).ending);
     files.push_back({poster, contents.poster});
   }
   const std::string head =
@@ -135,8 +136,11 @@ std::vector<query::ViewerFile> viewer_site(const PageContents& contents) {
 
 std::string page_with_module(const PageContents& contents) {
   const std::string script = "  <script type=\"module\">\n" + viewer_module() + "</script>\n";
-  const std::string poster =
-      contents.poster.empty() ? "" : "data:image/png;base64," + base64_of(contents.poster);
+  const std::string poster = contents.poster.empty()
+                                 ? ""
+                                 : std::string("data:") +
+                                       format_of_poster(contents.poster).media_type + ";base64," +
+                                       base64_of(contents.poster);
   return page_of(head_of(contents.title, "", script), poster_element(poster));
 }
 

@@ -11,7 +11,7 @@ namespace voxdag::server {
 // The contents of a page, besides the viewer.
 struct PageContents {
   std::string title;
-  std::string poster;  // a PNG file (poster.h); "" for no poster
+  std::string poster;  // a JPEG or PNG file (poster.h); "" for no poster
   // The URL of the published folder, which ends with a slash; "" if it is unknown. Other web sites
   // find the poster only with this URL.
   std::string url;

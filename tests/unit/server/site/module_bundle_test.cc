@@ -66,6 +66,10 @@ TEST(ViewerSite, HasAPoster) {
   const std::string single = page_with_module({"a", "picture", ""});
   EXPECT_NE(single.find("src=\"data:image/png;base64,cGljdHVyZQ==\""), single.npos);
   EXPECT_EQ(single.find("og:image"), single.npos);
+  const std::string jpeg = "\xff\xd8\xff\xe0";
+  EXPECT_EQ(viewer_site({"a", jpeg, ""})[1].name, query::hashed_name("poster", jpeg, ".jpg"));
+  EXPECT_NE(page_with_module({"a", jpeg, ""}).find("src=\"data:image/jpeg;base64,/9j/4A==\""),
+            std::string::npos);
 }
 
 }  // namespace
