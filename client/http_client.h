@@ -30,7 +30,7 @@ struct ClientOptions {
   std::string token;             // "": no token
   std::string ca_file;           // file of certificates to trust; "": the system's certificates
   double timeout_s = 30;         // limit for connecting, and for each read and write
-  double connect_timeout_s = 0;  // another limit for connecting; 0: timeout_s
+  double connect_timeout_s = 0;  // if not 0, replaces timeout_s for connecting
 };
 
 // The constructor throws Error{kInvalidInput} for a malformed URL. Requests throw Error{kIo} if the

@@ -43,7 +43,7 @@ class ProgressRelay {
   Progress& progress_;
   size_t stage_ = 0;  // stages before this one have ended
   bool has_begun_ = false;
-  uint64_t done_ = 0;  // units of the stage that were shown
+  uint64_t done_ = 0;  // units of the stage that `progress_` has received
 };
 
 // Throws the error of an export that has not succeeded.

@@ -20,8 +20,8 @@ Json make_export(ServiceClient& service, const std::string& job, const Json& req
 // Returns the exports of a job as a list of EXPORT, oldest first.
 Json exports_of(ServiceClient& service, const std::string& job);
 
-// Deletes an export and its files. Returns false if the server first stops its process. Throws
-// Error{kInvalidInput} unless `id` is 16 hex digits.
+// Deletes an export and its files. Returns false if the server still has to stop the export's
+// process and deletes the export later. Throws Error{kInvalidInput} unless `id` is 16 hex digits.
 bool delete_export(ServiceClient& service, const std::string& job, const std::string& id);
 
 // Returns the files of an EXPORT.

@@ -35,7 +35,8 @@ class ServiceClient {
   std::string full_id(const std::string& text);
   // Returns a job as the JSON object that docs/api.md calls JOB.
   Json job(const std::string& id);
-  // Posts an action ("cancel", "suspend", "resume", "retry"). Returns the JOB after the action.
+  // Performs an action on a job: "cancel", "suspend", "resume" or "retry". Returns the JOB after
+  // the action.
   Json post_action(const std::string& id, const std::string& action);
   // Fetches the JOB twice per second and calls on_job(JOB) each time, until the job has ended.
   // Returns the last JOB. Throws Error{kCanceled} if cancel() is canceled; the job itself

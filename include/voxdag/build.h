@@ -36,8 +36,8 @@ enum class BackendName { kAuto, kCpu, kCuda, kParallelHost };
 enum class MethodName { kDefault, kConsing, kPointers, kHashes };
 
 // Cutouts are parts of a surface that its material makes invisible (alpha modes MASK and BLEND).
-// kSkip leaves out voxels in which all surfaces are cut out; kKeep ignores cutouts. kDefault is
-// kSkip with colors, and kKeep without.
+// kSkip leaves out voxels in which all surfaces are cut out; kKeep ignores cutouts. kDefault means
+// kSkip for a build with colors, and kKeep for a build without colors.
 enum class CutoutRule { kDefault, kSkip, kKeep };
 
 // The rule that decides which empty voxels are inside the surface and are filled (docs/solid.md).

@@ -1,4 +1,4 @@
-// The one exception type of voxdag and its few codes.
+// The exception type that all functions of voxdag throw, and its error codes.
 #pragma once
 
 #include <exception>

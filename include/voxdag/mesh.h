@@ -14,8 +14,8 @@ namespace voxdag {
 struct Mesh {
   // x, y and z of each vertex, in any units. Doubles are not rounded to floats.
   std::variant<std::span<const float>, std::span<const double>> positions;
-  // Three vertex numbers for each triangle. Degenerate triangles set voxels like all other
-  // triangles. Without triangles, each vertex is a point, which sets one voxel.
+  // Three vertex indices, counted from 0, for each triangle. Degenerate triangles set voxels like
+  // all other triangles. Without triangles, each vertex is a point, which sets one voxel.
   std::span<const uint32_t> indices;
   // Red, green, blue and alpha of each vertex, in sRGB; alpha is linear. If the span is empty, all
   // vertices are white.

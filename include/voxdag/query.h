@@ -53,7 +53,7 @@ struct RayLimits {
 
 struct RayHit {
   double distance = 0;       // in voxels, from the ray's origin to the face that it entered
-  Position cell{};           // cell in the grid of 2^grid_levels
+  Position cell{};           // in the grid of 2^grid_levels cells per edge
   uint32_t grid_levels = 0;  // levels of the cell's grid
   // The normal of the face by which the ray entered: axis 0, 1, 2 for x, y, z, and sign 1 or -1. A
   // ray that begins in the cell has distance 0 and no face: axis -1 and sign 0.

@@ -42,7 +42,7 @@ class KeywordWriter {
     if (field.is_required) return;
     const std::string name = field.name;
     std::string type = python_type<T>(field);
-    if (name == "solid") type = "Union[bool, " + type + "]";  // True is the recommended rule
+    if (name == "solid") type = "Union[bool, " + type + "]";  // True selects the recommended rule
     members += "    " + name + ": Optional[" + type + "]\n";
     documents += "    " + name + std::string(name.size() < 17 ? 18 - name.size() : 1, ' ') +
                  documentation(field, value, true) + "\n";

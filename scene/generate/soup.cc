@@ -1,5 +1,5 @@
-// Random triangles in a cube: cases that no sensible model has and every builder has to survive.
-// The numbers of each kind in 1000 triangles are about:
+// Random triangles in a cube. They include cases that are rare in models but that a builder must
+// process without errors. The numbers of each kind in 1000 triangles are about:
 //     680  ordinary: their size is from 1/16 to 1/16384 of the cube's edge; all powers of 2 in this
 //          range are equally likely
 //     160  slivers: two corners far apart, the third close to one of them or to their edge

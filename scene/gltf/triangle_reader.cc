@@ -211,7 +211,8 @@ const uint32_t* TriangleReader::load_corners(uint64_t first, uint64_t count) {
   return &corners_[3 * static_cast<size_t>(first - window_first_)];
 }
 
-// Returns false, without changing `bounds`, if a triangle of the window is invalid.
+// Adds the positions of the window's triangles to `bounds`. If a triangle of the window is invalid,
+// returns false and leaves `bounds` unchanged.
 bool TriangleReader::add_bounds_of_window(WorldBounds& bounds) {
   if (used_vertices_.is_empty())
     used_vertices_.find({corners_.data(), 3 * static_cast<size_t>(window_count_)});

@@ -19,13 +19,13 @@ namespace voxdag {
 class MeshExport {
  public:
   // `where` names the mesh in messages. `uv_channel` is the set of texture coordinates to write.
-  // Counts points and lines in `warnings`. Throws Error{kInvalidInput} for an index that is out of
-  // range. The mesh must outlive this object.
+  // Adds a warning with the number of points and lines, which are left out. Throws
+  // Error{kInvalidInput} for an index that is out of range. The mesh must outlive this object.
   MeshExport(const aiMesh& mesh, std::string where, unsigned uv_channel, WarningList& warnings);
 
   uint64_t triangles() const { return triangles_; }
-  // Adds the arrays in the order in which write() writes them. Returns the primitive without its
-  // material.
+  // Adds the layouts of the arrays to `arrays`, in the order in which write() writes the arrays.
+  // Returns the JSON of the glTF primitive, without its material.
   nlohmann::json add_to(GlbArrays& arrays) const;
   // Writes the arrays. Triangulates polygons as the PLY reader does (scene/polygon).
   void write(GlbFile& file, MemoryBudget& budget, WarningList& warnings) const;

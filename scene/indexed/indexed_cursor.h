@@ -49,7 +49,7 @@ class IndexedCursor : public TriangleCursor {
   UsedVertices used_vertices_;
   PageBuffer<RealTriangle> batch_;
   PageBuffer<SurfaceTriangle> surfaces_;  // allocated by the first read_surfaces()
-  bool is_white_ = false;                 // true if open_surfaces() returned false
+  bool is_white_ = false;                 // open_surfaces() returned false: no colors
 };
 
 // The cursor of a scene without triangles.

@@ -12,7 +12,7 @@
 namespace voxdag::obj {
 namespace {
 
-// The first bytes of a file.
+// A file that ends after the first kMaxSniffedBytes bytes of another file.
 class FirstBytes : public ReadableFile {
  public:
   explicit FirstBytes(const ReadableFile& file) : file_(file) {}

@@ -15,7 +15,8 @@ namespace voxdag::ply {
 struct Layout {
   static constexpr size_t kNone = RequestedProperties::kNone;
 
-  // Indices of the elements vertex, face and tristrips; kNone if absent, or if it has no rows.
+  // Indices of the elements vertex, face and tristrips; kNone for an element that is absent or has
+  // no rows.
   size_t vertex = kNone, face = kNone, strips = kNone;
   std::array<size_t, 3> axes{};  // x, y and z of the vertices
   size_t face_indices = kNone;   // the list of vertex indices
@@ -24,11 +25,11 @@ struct Layout {
   // Red, green, blue and, if present, alpha. Empty unless all three colors exist. Colors of faces
   // are empty if the vertices have colors.
   std::vector<size_t> vertex_colors, face_colors;
-  // Texture coordinates: two numbers per vertex, or a list of two numbers per corner of a face.
-  // Empty and kNone if the header names no texture file.
+  // Texture coordinates: two numbers per vertex, or a list of two numbers per corner of a face. If
+  // the header names no texture file, `vertex_texture` is empty and `face_texture` is kNone.
   std::vector<size_t> vertex_texture;
   size_t face_texture = kNone;
-  size_t texture_number = kNone;  // property of faces: position in Header::texture_files
+  size_t texture_number = kNone;  // property of faces, an index into texture_files
 
   std::vector<std::string> ignored_colors;  // names of color properties that are not read
 };

@@ -1,6 +1,6 @@
 // The triangles of a point: one degenerate triangle, or the surface of a cube.
 //
-//        6-------7       corner bits: 1 the high x, 2 the high y, 4 the high z
+//        6-------7       bits of a corner number: 1 high x, 2 high y, 4 high z
 //       /|      /|
 //      4-------5 |       z
 //      | 2-----|-3       | y

@@ -10,9 +10,9 @@
 
 namespace voxdag::points {
 
-// True if the first row of the file has only numbers, at least three, or names the columns of the
-// second row. Also true if the file's name ends with .xyz, .txt or .csv and its beginning is text
-// that is not JSON.
+// True if the first row of the file has at least three fields and all of them are numbers, or if it
+// names the columns of the second row. Also true if the file's name ends with .xyz, .txt or .csv
+// and its beginning is text that is not JSON.
 bool is_text_points(const ReadableFile& file);
 
 // Opens the points of an open text file as a scene. Reads all lines once, to count the rows and to

@@ -26,8 +26,8 @@ class Rings {
   const RingNode& operator[](uint32_t node) const { return nodes_[node]; }
 
   // Divides the ring that contains nodes `from` and `to` by a diagonal between them. In one of the
-  // two new rings, `to` follows `from`. Returns the new node of the corner of `to` in the other
-  // ring. The edge that ended at `to` now ends at this new node.
+  // two new rings, `to` follows `from`. Returns the new node that represents the corner of `to` in
+  // the other ring. The edge that ended at `to` now ends at this new node.
   uint32_t divide(uint32_t from, uint32_t to) {
     const auto new_from = static_cast<uint32_t>(nodes_.size()), new_to = new_from + 1;
     const uint32_t after_from = nodes_[from].next, before_to = nodes_[to].previous;

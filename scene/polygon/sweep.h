@@ -3,10 +3,11 @@
 // n corners. Not thread-safe.
 //
 // Corners are swept in increasing x; corners of equal x in increasing y. Corners and edges of a
-// polygon may also touch or coincide. There the order is the order after an infinitely small
-// movement of all edges. kInward moves edges into the polygon, which separates the two edges of a
-// bridge from an outline to a hole. kOutward moves edges out of the polygon, which widens a neck of
-// width 0 between two parts of the polygon.
+// polygon may also touch or coincide. In these cases, the sweep uses the order that the corners and
+// edges have after an infinitely small movement of all edges. kInward moves edges into the polygon.
+// This separates the two coinciding edges of a bridge, which connects an outline to a hole.
+// kOutward moves edges out of the polygon, which widens a neck of width 0 between two parts of the
+// polygon.
 #pragma once
 
 #include <cstdint>

@@ -29,8 +29,9 @@ bool Triangulator::triangulate_projected() {
   return false;
 }
 
-// Removes collinear corners until no remaining corner is collinear or only two corners remain. Adds
-// a degenerate triangle for each removed corner. Sets kept_ to the remaining corners.
+// Removes corners that are collinear with their two neighbors, until there are no more such corners
+// or only two corners remain. Adds a degenerate triangle for each removed corner. Sets kept_ to the
+// remaining corners.
 void Triangulator::remove_collinear_corners() {
   Rings& ring = sweep_.rings();
   ring.reset(static_cast<uint32_t>(points_.size()));

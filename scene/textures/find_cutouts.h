@@ -24,7 +24,7 @@ Cutouts find_cutouts(FileSystem& files, const SceneMaterials& materials, unsigne
 // whose file cannot be opened, the SourceFile has no identity.
 std::vector<SourceFile> cutout_files(const SceneMaterials& materials);
 
-// True if the alpha mode of a material allows it to cut out triangles or parts of triangles.
+// True if at least one material has an alpha mode that can cut out triangles or parts of triangles.
 bool may_have_cutouts(const SceneMaterials& materials);
 
 // Returns a digest of everything that decides which parts of a scene's triangles are cut out.

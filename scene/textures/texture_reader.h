@@ -40,7 +40,7 @@ struct TextureLevel {
 // The levels of all images. The levels of image i begin at first_level[i].
 struct TextureLayout {
   std::vector<TextureLevel> levels;
-  std::vector<uint32_t> first_level;  // one entry per image, and the end
+  std::vector<uint32_t> first_level;  // one entry per image, then levels.size()
 };
 
 class TextureReader {

@@ -14,7 +14,7 @@
 // decoder (KTX2, DDS). In these cases, the materials of the image keep only their base color
 // factors. A warning for each problem names the first image, a material that uses it, and the
 // number of materials. A valid image whose decoder exceeds the budget (progressive JPEG, interlaced
-// PNG, WebP, AVIF) is an error, because memory must not decide the colors.
+// PNG, WebP, AVIF) is an error, because the colors must not depend on the available memory.
 #pragma once
 
 #include <cstdint>
@@ -44,8 +44,8 @@ class TextureSet {
   // The scratch file is created at `path`, in an existing folder, only if it is needed. The file's
   // name is removed as soon as the file is open. Throws Error{kOutOfMemory} with image and
   // material, {kNoSpace}, {kIo}, {kCanceled}, and {kInvalidInput} for an image file that changed
-  // since the scene was opened. `files` and `budget` must outlive the set. With `cutouts`, no image
-  // may be used by materials with different masks (with_separate_images()).
+  // since the scene was opened. `files` and `budget` must outlive the set. If `cutouts` is not
+  // null, materials with different masks must not share an image (with_separate_images()).
   static std::unique_ptr<TextureSet> prepare(FileSystem& files, const SceneMaterials& materials,
                                              const std::string& path, unsigned threads,
                                              MemoryBudget& budget, Progress& progress,

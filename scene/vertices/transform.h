@@ -42,8 +42,8 @@ inline void apply(const Transform& transform, const double* local, double* world
 }
 
 // Returns the transform that applies scale `s` first, then rotation `r`, then translation `t`. `r`
-// is a quaternion (x, y, z, w). from_trs() does not normalize `r`, although the length of a
-// quantized quaternion is only about 1, because no other reader of glTF normalizes it.
+// is a quaternion (x, y, z, w). from_trs() does not normalize `r`, because no other reader of glTF
+// does. So the length of a quantized quaternion can differ slightly from 1.
 inline Transform from_trs(const std::array<double, 3>& t, const std::array<double, 4>& r,
                           const std::array<double, 3>& s) {
   const double x = r[0], y = r[1], z = r[2], w = r[3];

@@ -65,9 +65,9 @@ void charge_more(MemoryCharge& charge, uint64_t bytes) {
 template <class Decoder>
 class BoundedDecoder : public Decoder {
  public:
-  // `vertices`: maximum number of vertices. With kCountVertices, the decoder only counts the
-  // vertices: it stops before it decodes their attributes, and stores the count in `refusal` as a
-  // VertexCount.
+  // `vertices` is the maximum number of vertices. If it is kCountVertices, the decoder only counts
+  // the vertices: it stops before it decodes their attributes, and stores the count in `refusal` as
+  // a VertexCount.
   BoundedDecoder(const DracoHeader& header, uint64_t vertices, MemoryCharge& charge)
       : header_(header), vertices_(vertices), charge_(charge) {}
 
@@ -162,8 +162,8 @@ void decode_as(const DracoHeader& header, std::span<const std::byte> data, Memor
 }
 
 // Decodes Draco data into `mesh`. `compressed` includes the header. `max_vertices` is the maximum
-// number of vertices. With kCountVertices, decode_mesh() only counts the vertices: it stops before
-// it decodes their attributes, and throws the count as a VertexCount.
+// number of vertices. If it is kCountVertices, decode_mesh() only counts the vertices: it stops
+// before it decodes their attributes, and throws the count as a VertexCount.
 void decode_mesh(std::span<std::byte> compressed, const DracoHeader& header, MemoryCharge& charge,
                  uint64_t max_vertices, draco::Mesh& mesh) {
   charge_more(charge,

@@ -114,7 +114,8 @@ class Walker {
 
 // Returns the number of vertices of the faces. Draco decodes one value per vertex, because its
 // traversal of the faces visits each vertex once. The traversal could miss vertices if two
-// neighboring faces did not share both vertices of their common edge, so such tables are refused.
+// neighboring faces did not share both vertices of their common edge. So the function refuses a
+// corner table with such faces.
 template <class CornerTable>
 uint64_t count_vertices(const CornerTable& table) {
   std::vector<bool> is_counted(static_cast<size_t>(table.num_vertices()));
@@ -164,7 +165,7 @@ uint64_t count_entries(const Group& group, int first_attribute, draco::MeshDecod
   if (!group.is_per_corner) return count_vertices(*table);
   const draco::MeshAttributeCornerTable* const own =
       decoder.GetAttributeCornerTable(first_attribute);
-  if (!own) refuse_damaged();  // two groups claim one connectivity
+  if (!own) refuse_damaged();  // two groups of attributes use the same connectivity
   return count_vertices(*own);
 }
 
@@ -235,7 +236,7 @@ void skip_group(Walker& walker, const Group& group, int index, draco::MeshDecode
   }
   for (size_t i = 0; i < group.coders.size(); ++i) {
     if (group.coders[i] == draco::SEQUENTIAL_ATTRIBUTE_ENCODER_QUANTIZATION)
-      walker.skip(sizeof(float) * (attribute(i).num_components() + 1u));  // the minima, the range
+      walker.skip(sizeof(float) * (attribute(i).num_components() + 1u));  // minima and range
     if (group.coders[i] >= draco::SEQUENTIAL_ATTRIBUTE_ENCODER_QUANTIZATION)
       walker.skip(1);  // the number of bits
   }

@@ -85,8 +85,9 @@ T without_zigzag(T value) {
   return static_cast<T>(value & 1 ? ~(value >> 1) : value >> 1);
 }
 
-// Applies the deltas of one channel, which has four bytes of each element. `element`: the channel's
-// bytes in the previous element, which add_deltas() changes to its bytes in the current element.
+// Applies the deltas of one channel, which has four bytes of each element. `element` has the
+// channel's bytes of the previous element. add_deltas() replaces them by the channel's bytes of the
+// current element.
 void add_deltas(unsigned mode, const std::array<uint8_t, 4>& delta, uint8_t* element) {
   const auto pair = [](const uint8_t* bytes) {
     return static_cast<uint16_t>(bytes[0] | bytes[1] << 8);

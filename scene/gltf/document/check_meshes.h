@@ -8,8 +8,8 @@
 namespace voxdag::gltf {
 
 // Marks the meshes that nodes of the scene draw. Checks these meshes, and the skins and instances
-// of the nodes. Calls place_draco_primitive() for compressed primitives. Throws
-// Error{kInvalidInput}.
+// of the nodes. Calls place_draco_primitive() (compression.h) for primitives that Draco has
+// compressed. Throws Error{kInvalidInput}.
 void check_drawn_meshes(Document& document);
 
 // Returns the buffer of decoded Draco data that has the primitive's positions. Returns null if the

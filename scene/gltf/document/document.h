@@ -200,7 +200,7 @@ struct Document {
   std::deque<std::vector<int>> scenes;                 // root nodes of each scene
   std::shared_ptr<const DocumentMaterials> materials;  // set by resolve_materials()
   int scene = -1;                                      // the default scene; -1: none
-  std::vector<int> roots;                // roots of the scene to draw; set by check_document()
+  std::vector<int> roots;                // roots of the drawn nodes; set by check_document()
   std::map<int, Transform> above_roots;  // for a root with a parent: the parent's global transform
   // Messages about buffers, bufferViews, accessors, meshes and skins that break a rule of glTF, by
   // section and index. check_usable() throws the message.

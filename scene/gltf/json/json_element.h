@@ -33,11 +33,11 @@ class JsonElement {
       : value_(value), key_(section), index_(index), uri_(&uri) {}
 
   const Json& value() const { return value_; }
-  // Returns the name of the root's section, or of the member in the parent object.
+  // Returns the name of the root's section, or the name of the member in the parent object.
   std::string_view key() const { return key_; }
   bool is_in_array() const { return index_ != kNoIndex; }
   const RawString& uri() const { return *uri_; }
-  // "nodes[3].children[0]"
+  // Returns the position of the value for messages, such as "nodes[3].children[0]".
   std::string path() const;
 
   // Returns the member of an object; nullopt if it is absent.

@@ -19,7 +19,7 @@ namespace voxdag::gltf {
 struct JsonSection {
   std::string name;
   bool is_array;    // each element is read separately; otherwise the section is one element
-  bool is_checked;  // true: read_sections() returns a Violation; false: it is ignored
+  bool is_checked;  // true: read_sections() returns the message of a Violation
   // Receives each element as a value or as text. May throw Violation. The argument is valid during
   // the call.
   std::variant<std::function<void(const JsonElement&)>, std::function<void(const ElementText&)>>

@@ -12,8 +12,8 @@
 namespace voxdag::gltf {
 namespace {
 
-// Maximum number of open files of all readers of a scene together. Each reader may open at least
-// one file, even if the sum is then larger.
+// Maximum number of open files of all readers of a scene together. Each reader can have at least
+// one open file, even if all readers together then exceed this maximum.
 constexpr unsigned kMaxOpenFiles = 32;
 constexpr uint64_t kMapNodeBytes = 48;
 // Maximum number of base64 groups, which encode three bytes each, in a window. A window may begin

@@ -25,7 +25,8 @@ class ExternalFiles {
  public:
   ExternalFiles(const std::string& scene_path, MemoryBudget& budget)
       : charge_(budget, "the list of external files of " + scene_path) {}
-  // Records the opened file of a buffer. Throws Error{kInvalidInput} if the file has changed.
+  // Records the opened file of a buffer. Throws Error{kInvalidInput} if the buffer's file was
+  // recorded before and has changed since then.
   void add(int buffer, const SourceFile& file);
   std::vector<SourceFile> all() const;
 

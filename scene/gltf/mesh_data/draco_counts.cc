@@ -62,10 +62,10 @@ bool fits_strip(const DracoPart& part, uint64_t faces) {
   return part.is_strip && faces <= triangles && triangles <= kMaxStripTrianglesPerFace * faces;
 }
 
-// Returns the part with the numbers of corners and vertices in its Draco data. If the header
-// contradicts part.vertices, decodes the faces to count the vertices. Does the same if the header
-// neither confirms nor contradicts part.vertices, but only for at most `checked_faces` faces, and
-// subtracts their number from `checked_faces`.
+// Returns a copy of the part, with the numbers of corners and vertices that its Draco data have. If
+// the header contradicts part.vertices, decodes the faces to count the vertices. Does the same if
+// the header neither confirms nor contradicts part.vertices, but only for at most `checked_faces`
+// faces, and subtracts their number from `checked_faces`.
 DracoPart correct(const DracoPart& part, BufferReader& buffers, uint64_t& checked_faces) {
   DracoPart out = part;
   buffers.check_length(part.from.buffer);

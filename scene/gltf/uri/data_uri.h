@@ -23,7 +23,7 @@ std::optional<DataUri> parse_data_uri(std::string_view text);
 
 // True if the characters contain white space, percent escapes, or characters of the URL-safe
 // alphabet. decode_base64() in scene/base64.h cannot decode such characters. decode_data() can
-// decode them if they are base64 otherwise.
+// decode them if they are otherwise valid base64.
 bool has_unusual_base64(std::span<const char> characters);
 
 // Decodes all data of a data: URI. Base64 may contain white space and percent escapes, use the

@@ -1,8 +1,8 @@
 // An open OBJ file after one pass over it. It has the numbers of vertices, texture coordinates,
-// faces and triangles, the position in the file of every n-th of them (block_index.h), and the
-// names of materials and libraries. A face of n corners has n - 2 triangles (scene/polygon); a face
-// with fewer than three corners has none. If there are faces of more than three corners, a second
-// pass finds the blocks of faces with concave polygons.
+// faces and triangles, and the names of materials and libraries. It also has the file position of
+// every n-th vertex, texture coordinate and face (block_index.h). A face of n corners has n - 2
+// triangles (scene/polygon); a face with fewer than three corners has none. If there are faces of
+// more than three corners, a second pass finds the blocks of faces with concave polygons.
 #pragma once
 
 #include <cstdint>
@@ -23,9 +23,9 @@ class PolygonReader;
 
 class ObjFile {
  public:
-  // Throws Error{kInvalidInput} with the line for a free-form curve or surface, a call of another
-  // file, or a damaged polygon; Error{kLimit} for a line that is too long, or 2^32 - 1 vertices or
-  // texture coordinates; Error{kOutOfMemory}.
+  // Throws Error{kInvalidInput} with the line for a free-form curve or surface, a statement `call`
+  // (which includes another file), or a damaged polygon; Error{kLimit} for a line that is too long,
+  // or for 2^32 - 1 or more vertices or texture coordinates; Error{kOutOfMemory}.
   ObjFile(std::unique_ptr<ReadableFile> file, MemoryBudget& budget, const CancelToken& cancel);
 
   // The beginning of a line.

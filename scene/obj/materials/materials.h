@@ -27,7 +27,7 @@ struct ObjMaterials {
   };
 
   SceneMaterials scene;
-  std::vector<Use> uses;          // by number in ObjFile::materials()
+  std::vector<Use> uses;          // one for each of ObjFile::materials()
   std::vector<SourceFile> files;  // the libraries
   GrowingCharge charge;
 };

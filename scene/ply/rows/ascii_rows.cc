@@ -68,7 +68,7 @@ class AsciiRows : public Rows {
       first_irregular_ = printable(element_.name) + " " + std::to_string(row) + " " + what;
   }
 
-  std::vector<size_t> number_of_;  // by property: its position in numbers()
+  std::vector<size_t> number_of_;  // position of each property in numbers()
   WordScanner text_;
 };
 

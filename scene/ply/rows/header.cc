@@ -206,7 +206,7 @@ class HeaderParser {
   const std::string& path_;
   const std::string_view text_;
   const bool is_whole_file_;
-  bool has_cr_ = false, has_lf_ = false;  // a line ended with CR alone, or with LF
+  bool has_cr_ = false, has_lf_ = false;  // true if a line ended with CR alone, with LF
   bool has_format_ = false;
   size_t at_ = 0;
   uint64_t line_ = 0;

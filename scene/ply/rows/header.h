@@ -36,7 +36,7 @@ struct Property {
   std::string name;
   Type type = Type::kFloat;  // for a list: type of its entries
   bool is_list = false;
-  Type count_type = Type::kUint8;  // for a list: type of the count, an integer
+  Type count_type = Type::kUint8;  // for a list: the integer type of its count
 };
 
 struct Element {
@@ -54,7 +54,7 @@ struct Header {
   std::vector<Element> elements;
   std::vector<std::string> texture_files;  // names from the comments "TextureFile NAME"
   uint64_t ignored_lines = 0;              // lines that are not part of PLY
-  uint64_t first_ignored_line = 0;         // number of the first of them
+  uint64_t first_ignored_line = 0;         // line number of the first ignored line
   std::string first_ignored_word;
   uint64_t data_begin = 0;  // offset of the first element
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr size_t kNoProperty = RequestedProperties::kNone;
 
-// Convert `count` numbers at `bytes`.
+// Functions that convert the `count` numbers at `bytes` to vertex indices or doubles.
 using DecodeIndices = void (*)(const std::byte* bytes, size_t count, uint32_t* out);
 using DecodeReals = void (*)(const std::byte* bytes, size_t count, double* out);
 

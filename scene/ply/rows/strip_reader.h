@@ -64,7 +64,7 @@ class StripReader {
   std::optional<FileWindow> window_;
   std::optional<WordScanner> text_;
   Position at_;
-  uint32_t entry_ = 0;  // the last entry
+  uint32_t entry_ = 0;  // the last entry that was read
 };
 
 }  // namespace voxdag::ply

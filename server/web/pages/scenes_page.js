@@ -27,7 +27,7 @@ export function scenesPage(_, query, signal) {
     const path = new URLSearchParams({limit: kPageSize, ...(cursor && {cursor})});
     const list = await getJson(`/api/v1/scenes?${path}`, signal);
     const text = JSON.stringify(list);
-    if (text === known) return kPauseMs;  // keeps the focus
+    if (text === known) return kPauseMs;  // keeps the elements and their focus
     known = text;
     clear(rows, list.scenes.map((scene) => sceneRow(scene, error, update)));
     table.hidden = list.scenes.length === 0;

@@ -97,8 +97,8 @@ export class Camera {
     this.eye = eye;
   }
 
-  // Multiplies the distances of eye and target from `point` by `factor`, within limits. The point
-  // keeps its place in the picture.
+  // Multiplies the distances of eye and target from `point` by `factor`, limited so that
+  // kMinDistance and kFarthest hold. The point keeps its place in the picture.
   zoomAbout(point, factor) {
     const least =
         kMinDistance / Math.min(this.distance, Math.max(distance(this.eye, point), kMinDistance));

@@ -74,8 +74,8 @@ function addWindowLink() {
   place("scene").parentElement.append(link);
 }
 
-// Resolves to the job when it has a result. Also waits for a failed or canceled job, because it may
-// be retried.
+// Resolves to the job when it has a result. Also waits for a failed or canceled job, because the
+// user can retry it.
 async function finishedJob() {
   let known = null, waits = null, draws = true, pauseMs = kPauseMs;
   for (;;) {

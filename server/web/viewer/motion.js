@@ -15,7 +15,7 @@ const kFast = 4;        // factor of the speed while Shift is held
 const kFirstStepS = 1 / 20;
 
 export class Motion {
-  // seenDistance() is in voxels.
+  // seenDistance() returns the distance of the visible surface in voxels.
   constructor(camera, seenDistance) {
     this.camera = camera;
     this.seenDistance = seenDistance;

@@ -136,7 +136,7 @@ export class ExportsView {
     return {element, state: it.state, update};
   }
 
-  // "glb, 2048³, up z"
+  // Returns the format and options of an export, such as "glb, 2048³, up z".
   nameOf({to, level, ...more}) {
     const options = Object.entries(more).map(
         ([option, value]) => value === true ? option : `${option} ${value}`);

@@ -82,7 +82,8 @@ function resultFile(job) {
   return {href: job.links.dag, name: fileName(job), bytes: job.result.bytes};
 }
 
-// Returns a shell command for the same download, which resumes after a lost connection.
+// Returns an element with a shell command that downloads the job's result. This command can resume
+// the download after a lost connection.
 export function downloadCommand(job) {
   const text = `voxdag download ${job.id} -o ${fileName(job)} --server ${location.origin}` +
       (token.get() ? " --token-file FILE" : "");

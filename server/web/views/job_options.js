@@ -135,7 +135,7 @@ export class JobOptions {
     this.sizeRow.hidden = cube !== "voxel_size";
   }
 
-  // True if cells have colors or other attributes.
+  // True if the form requests colors or other attributes of cells.
   hasCells() {
     return [this.fields.flags.color, ...this.fields.attributes].some((input) => input.checked);
   }

@@ -1,5 +1,5 @@
 // Shows the subvolumes that a running job has built. Each subvolume is drawn as the occupied cells
-// of its coarse brick.
+// of its coarse brick, a mask of 4x4x4 cells that divide the subvolume.
 
 import {CubesView} from "./cubes_view.js";
 

@@ -45,8 +45,8 @@ export class SceneChoice {
                       "In one of the scene folders configured for the service.")));
   }
 
-  // Returns the entered path. Without a path, returns the scenes of a copied job that has several,
-  // or the selected scene; "" if no scene is selected.
+  // Returns the entered path. If no path is entered and the form copies a job with several scenes,
+  // returns these scenes. Otherwise returns the selected scene; "" if no scene is selected.
   value() {
       return this.path.value.trim() || this.several || this.select.value;
   }

@@ -8,10 +8,10 @@ import {TilePool} from "../tiles/tile_pool.js";
 
 import {decodePage, kBlockWords, kMoreAt} from "./page_format.js";
 
-// In the first kRoundsToKnow readings of a view, pages that were used within this time are not
-// evicted, because the view possibly still uses them.
+// In the first kRoundsToKnow (tiles/loader.js) readings of a view, pages that were used within this
+// time are not evicted, because the view possibly still uses them.
 const kRecentMs = 1500;
-const kFreeShare = 1 / 64;                   // share of the pool that an eviction frees in addition
+const kFreeShare = 1 / 64;                   // share that an eviction frees beyond the need
 const kTableShare = 1 / 5;                   // share of the budget for the hash table
 const kEntryBytes = 16, kTableWidth = 1024;  // the shaders contain the same table width
 // Maximum number of entries of the hash table. The pool has at most 2^20 blocks, so half of the

@@ -2,7 +2,7 @@
 // picture. It contains the missing tiles, the used tiles, and statistics. A *reading* is one
 // feedback, copied from the GPU.
 
-const kMaxSamples = 4096;  // texels from which the statistics are computed
+const kMaxSamples = 4096;  // maximum number of texels that the statistics read
 const kHalf = new DataView(new ArrayBuffer(4));
 
 function halfToNumber(bits) {
@@ -20,11 +20,16 @@ function shareOf(sorted, share) {
       sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))];
 }
 
-// Returns
-// {wanted: Map from the texels of cut-off nodes (tiles/tile_format.js) whose tiles are missing to
-//  priorities, slots: Set of the slots of used tiles, coarsePixels: width of the widest cell with a
-//  missing tile, medianT, nearestT, exposure (null if no surface is seen), stepsMean, steps99 (99th
-//  percentile)}.
+// Returns an object with these members:
+//
+//     wanted         Map from the texel of each cut-off node (tiles/tile_format.js) whose tile is
+//                    missing to a priority
+//     slots          Set of the slots of used tiles
+//     coarsePixels   width of the widest cell whose tile is missing
+//     medianT, nearestT   median and minimum distance of the visible surfaces
+//     exposure       exposure for these surfaces; null if no surface is visible
+//     stepsMean, steps99   mean and 99th percentile of the steps of the rays
+//
 // The last five values are measured on a sample of the pixels.
 export function readFeedback(words) {
   const wanted = new Map(), slots = new Set(), texels = words.length / 4;

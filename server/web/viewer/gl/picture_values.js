@@ -1,6 +1,6 @@
 // The uniforms of all rays of a picture.
 
-const kConeShare = 0.75;  // share of a pixel: cells up to this width are hit as one cell
+const kConeShare = 0.75;  // in pixels: rays hit a cell of up to this width as one solid cube
 
 // Returns the uniforms for a picture of width x height pixels, drawn by `renderer` with its loaded
 // tiles. Its cells are as fine as in a picture with `lodHeight` rows.

@@ -18,7 +18,7 @@ export class PackageFiles {
     this.timeoutMs = kTimeoutMs;
     this.hasRanges = true;         // false after a wrong answer to a range request
     this.rangesAreProven = false;  // true after a range had the right header field or contents
-    this.whole = new Map();        // complete files: name -> promise of bytes, last used last
+    this.whole = new Map();        // complete files: name -> promise of bytes, in order of use
     this.wholeBytes = 0;
     this.fetchedBytes = 0;
     this.requestCount = 0;

@@ -36,7 +36,7 @@ export class PackageSource {
       message:
           "Part of the files is missing or damaged and drawn coarse: run voxdag publish --check."
     };
-    this.blocks = new Map();  // block -> promise of the decoded block; last used last
+    this.blocks = new Map();  // block -> promise of the decoded block, in order of use
     this.cachedBytes = 0;
     this.lookedMs = -Infinity;
     this.looking = null;

@@ -20,7 +20,7 @@ export async function pickVoxel(renderer, cssX, cssY) {
   return hitOf(words, view.eye, view.direction(x, y, width, height), store, renderer.info);
 }
 
-// Decodes the words of pickOne().
+// Decodes the words that pickOne() (gl/passes.js) returns for a hit.
 function hitOf(words, eye, direction, store, info) {
   const distance = new Float32Array(words.buffer, 0, 1)[0], axis = words[1] >>> 21 & 3;
   const normal = axis === 3 ? direction.map((d) => -d) : [0, 0, 0];

@@ -27,7 +27,7 @@ export {WebGLUnavailable};
 const kBudgetBytes = 256 << 20, kPhoneBudgetBytes = 64 << 20;
 // Maximum number of canvas pixels. The budget does not include the render targets for these pixels.
 const kMaxPixels = 8e6, kPhoneMaxPixels = 2e6;
-const kMovingMs = 180;  // duration of "moving" after the last change of the view
+const kMovingMs = 180;  // the camera counts as moving until this time after its last change
 const kSamples = 16;    // number of samples per pixel of a still picture
 // Statistics record the time of the first picture in which all cells with missing tiles are
 // narrower than this number of pixels.
@@ -282,8 +282,8 @@ export class Renderer {
     this.onChange();
   }
 
-  // Returns the internal resolution. If frames take long, it is lower while the camera moves and
-  // while tiles arrive.
+  // Returns the resolution at which frames are rendered. If frames take long, this resolution is
+  // lower while the camera moves and while tiles arrive.
   internalSize(moving) {
     const scale = this.resolutionScale(moving);
     const scaled = (pixels) => Math.max(1, Math.round(pixels * scale));

@@ -1,6 +1,6 @@
 // Moves the sun so that it lights about kLitShare of a view inside a scene. Runs once, after the
-// first complete view. A shadow test for a candidate position may need tiles that are missing.
-// The search requests these tiles, and is repeated until no tile is missing or it makes no
+// first complete view. A shadow test for a candidate position can need tiles that are not loaded
+// yet. The search requests these tiles, and is repeated until no tile is missing or it makes no
 // progress.
 
 const kLitShare = 0.35;    // share of the visible surface that the sun should light
@@ -12,7 +12,7 @@ export class SunSearch {
     this.light = light;
     this.idleTrials = 0;
     this.fewestMissing = Infinity;
-    this.usablePasses = null;  // the passes for which the programs of the search are compiled
+    this.usablePasses = null;  // Passes whose search programs are compiled
   }
 
   get isOver() {

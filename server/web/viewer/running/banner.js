@@ -31,8 +31,9 @@ export class Banner {
     this.element = h("div", {class: "banner"}, this.text, toggle, legend);
   }
 
-  // `job` is null while the service does not answer. `built` and `total` are the last known
-  // numbers. `isMerged` is true if the picture shows all voxels, and only their colors are missing.
+  // `job` is null while the service does not answer. `built` and `total` are the last known numbers
+  // of built subvolumes and of all subvolumes. `isMerged` is true if the picture shows all voxels,
+  // and only their colors are missing.
   show(job, {built = 0, total = 0}, isMerged = false) {
     setText(this.text, job ? describe(job, built, total, isMerged) : kNoAnswer);
     this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;

@@ -19,7 +19,7 @@ export class FirstView {
     // view.
     this.slopes = [view.tangent * width / height, view.tangent];
     this.known = new Map();   // key -> words of a tile
-    this.places = new Map();  // tile key -> low corners of the places that need the tile
+    this.places = new Map();  // tile key -> low corners of all cubes that consist of this tile
     this.wanted = new Map();  // texel of a cut-off node -> width in pixels of its widest cell
     this.takenMs = 0;         // time of the last tile
   }

@@ -4,8 +4,8 @@
 
 import {TileError} from "../tile_source.js";
 
-// If an item was marked in none of this number of consecutive readings, the view does not use the
-// item.
+// Number of consecutive readings that mark all items that the view uses. So the view does not use
+// an item that none of these readings has marked.
 export const kRoundsToKnow = 4;
 const kFirstPauseMs = 300, kMaxPauseMs = 10000, kMaxBusyMs = 60000;
 const kMaxTries = 3;         // tries per item if the answers are unusable
@@ -114,9 +114,9 @@ export class Loader {
     if (unmet === 0) this.endOutage();
     // takeBatch() takes items from the end of the queue, so the items that are requested first are
     // sorted to the end. Items that possibly caused an error (`last`) are requested after all other
-    // items, so that they do not delay these. Among the items with `last`, an item with a smaller
-    // `batch` (the size of the largest batch in which the item may be requested) is requested
-    // later.
+    // items, so that they do not delay the other items. Among the items with `last`, an item with a
+    // smaller `batch` (the size of the largest batch in which the item may be requested) is
+    // requested later.
     const trust = ({key}) =>
         this.failures.get(key)?.last ? this.failures.get(key).batch : this.maxBatch;
     this.queue = requests.sort((a, b) => trust(a) - trust(b) || a.priority - b.priority);

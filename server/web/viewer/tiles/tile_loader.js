@@ -5,7 +5,7 @@ import {TileError} from "../tile_source.js";
 import {Loader, pauseAfter} from "./loader.js";
 
 const kMaxRequests = 4, kMaxBatch = 48;
-const kMaxRootTries = 3;  // with unusable answers
+const kMaxRootTries = 3;  // tries to load the root if the answers are unusable
 
 // A request is {key, level, offset, priority, leaves}; `leaves` are the texels of the cut-off nodes
 // that must be linked to the tile.

@@ -26,7 +26,7 @@ export class TilePool {
     this.maxRows =
         Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
     this.rows = grows ? kFirstRows : this.maxRows;
-    this.blockCount = this.maxRows * kBlocksPerRow;  // of the final size
+    this.blockCount = this.maxRows * kBlocksPerRow;  // number at the final size
     this.tableRows = Math.ceil(this.blockCount / kTableWidth);
     this.slotCount = this.tableRows * kTableWidth;
     this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);

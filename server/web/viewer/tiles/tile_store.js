@@ -17,7 +17,7 @@ import {decodeTile, kBlockTexels, kTexelWords, tileShape} from "./tile_format.js
 // evicted, because the view possibly still uses them.
 const kRecentMs = 1500;
 const kBlockBytes = kBlockTexels * kTexelWords * 4;
-const kFreeShare = 1 / 64;  // share of the pool that an eviction frees in addition
+const kFreeShare = 1 / 64;  // share of the pool that an eviction frees beyond the need
 
 // Returns a unique number for a node. Offsets are below 2^40.
 export function keyOf(level, offset) {
@@ -80,8 +80,8 @@ export class TileStore {
     return true;
   }
 
-  // Stores a fetched tile. Returns false if the pool is full and the view needs all its tiles.
-  // Throws if the fetched tile is damaged.
+  // Stores a fetched tile. Returns false if the pool is full and the view needs all tiles in the
+  // pool. Throws if the fetched tile is damaged.
   add(level, offset, words, nowMs) {
     const key = keyOf(level, offset);
     if (this.tiles.has(key)) return true;
