@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/host_device.h"
 #include "core/base/popcount8.h"
 #include "core/dag/brick.h"
 #include "core/format/global/voxdag_reader.h"
@@ -48,7 +49,7 @@ class DagView {
   const Level& level(uint32_t depth) const { return levels_[depth]; }
   // Prefetches the node or brick at this word offset of the level at `depth` into the CPU's cache.
   // Does nothing if the level has no such word.
-  void prefetch(uint32_t depth, uint64_t offset) const {
+  VOXDAG_PREFETCH void prefetch(uint32_t depth, uint64_t offset) const {
     const std::span<const uint32_t> words = levels_[depth].words;
     if (offset < words.size()) __builtin_prefetch(words.data() + offset);
   }

@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/host_device.h"
 #include "core/dag/consing/pooled_memory.h"
 #include "query/extract/node_reader.h"
 
@@ -42,7 +43,7 @@ class PartLevel {
   void reserve(uint64_t count) {
     if (2 * count >= slots_size_) grow_slots(2 * count + 1);
   }
-  void prefetch(uint64_t offset) const {
+  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
     __builtin_prefetch(&slots_[offset * kMultiplier >> shift_]);
   }
   // Returns the number of the node at `offset`, which must not be cut by the region. Adds the node

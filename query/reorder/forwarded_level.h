@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/base/popcount8.h"
@@ -39,7 +40,7 @@ class ForwardedLevel {
           words_.data() + first);
   }
 
-  void prefetch(uint64_t offset) const {
+  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
     if (offset < words_.size()) __builtin_prefetch(words_.data() + offset);
   }
   // Returns the new offset of the node or brick that begins at word `offset` of the input file. If

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/io/file_system.h"
@@ -76,7 +77,7 @@ class TextureReader {
       return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
     }
     // Starts to load a texel that is in memory into the CPU's cache, for a later texel().
-    void prefetch(uint32_t x, uint32_t y) const {
+    VOXDAG_PREFETCH void prefetch(uint32_t x, uint32_t y) const {
       if (texels_) __builtin_prefetch(&texels_[place_of(x, y)]);
     }
 

@@ -35,7 +35,7 @@ class RegionCells {
 
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
   // Call prefetch() some time before touch() or cover(), so that these do not wait for memory.
-  void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
+  VOXDAG_PREFETCH void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
   // Adds the cell if it is new, and returns the number of the cell, for sum() and attributes().
   uint32_t touch(uint32_t code) {
     uint32_t& place = places_[code];

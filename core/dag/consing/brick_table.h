@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/host_device.h"
 #include "core/dag/consing/pooled_memory.h"
 
 namespace voxdag {
@@ -31,7 +32,9 @@ class BrickTable {
     if (count_ + more > capacity_) grow(count_ + more);
   }
 
-  void prefetch(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
+  VOXDAG_PREFETCH void prefetch(uint64_t hash) const {
+    __builtin_prefetch(&slots_[hash >> shift_]);
+  }
 
   // Returns the id of the brick; adds the brick if it is new. Requires mask != 0, and that `hash`
   // is hash_brick(mask).

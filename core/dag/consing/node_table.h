@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/host_device.h"
 #include "core/base/popcount8.h"
 #include "core/dag/consing/pooled_memory.h"
 
@@ -66,9 +67,11 @@ class NodeTable {
     if (words > records_.size()) grow_records(words);
   }
 
-  void prefetch_slot(uint64_t hash) const { __builtin_prefetch(&slots_[hash >> shift_]); }
+  VOXDAG_PREFETCH void prefetch_slot(uint64_t hash) const {
+    __builtin_prefetch(&slots_[hash >> shift_]);
+  }
   // Prefetches the record that find_or_add() will most likely compare with the node.
-  void prefetch_record(uint64_t hash) const {
+  VOXDAG_PREFETCH void prefetch_record(uint64_t hash) const {
     __builtin_prefetch(&records_[static_cast<uint32_t>(slots_[hash >> shift_])]);
   }
 

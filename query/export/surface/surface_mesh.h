@@ -37,7 +37,7 @@ class VertexTable {
   // Returns the number of the vertex. Adds the vertex if it is new. Throws Error{kOutOfMemory}.
   uint32_t find_or_add(uint64_t place, voxdag_reader::Rgb color);
   bool contains(uint64_t place, voxdag_reader::Rgb color) const;
-  void prefetch(uint64_t place, voxdag_reader::Rgb color) const {
+  VOXDAG_PREFETCH void prefetch(uint64_t place, voxdag_reader::Rgb color) const {
     __builtin_prefetch(&slots_[slot_of(place, color_code(color))]);
   }
   MemoryBudget& budget() const { return budget_; }

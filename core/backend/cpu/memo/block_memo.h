@@ -19,6 +19,7 @@
 
 #include "core/backend/cpu/memo/memo_gate.h"
 #include "core/backend/cpu/raster/voxel_block.h"
+#include "core/base/host_device.h"
 #include "core/dag/consing/pooled_memory.h"
 
 namespace voxdag::cpu {
@@ -36,7 +37,7 @@ class BlockMemo {
 
   // True if the memo should be used for the next `count` blocks, which count as lookups.
   bool is_worthwhile(int count) { return gate_.is_open(count); }
-  void prefetch(uint64_t key) const { __builtin_prefetch(&blocks_[slot_of(key)]); }
+  VOXDAG_PREFETCH void prefetch(uint64_t key) const { __builtin_prefetch(&blocks_[slot_of(key)]); }
   // Returns the node of a block, or null if the block is not in the memo. The block must not be
   // empty, because a free slot looks like an empty block. `key`: block_key() of the block.
   const Node* find(uint64_t key, const VoxelBlock& block) const {

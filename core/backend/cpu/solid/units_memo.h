@@ -15,6 +15,7 @@
 
 #include "core/backend/cpu/memo/memo_gate.h"
 #include "core/backend/cpu/raster/voxel_block.h"
+#include "core/base/host_device.h"
 #include "core/dag/consing/pooled_memory.h"
 
 namespace voxdag::cpu {
@@ -33,7 +34,7 @@ class UnitsMemo {
 
   // True if the memo should be used for the next `count` blocks, which count as lookups.
   bool is_worthwhile(int count) { return slots_ != 0 && gate_.is_open(count); }
-  void prefetch(uint64_t key) const {
+  VOXDAG_PREFETCH void prefetch(uint64_t key) const {
     __builtin_prefetch(&blocks_[slot_of(key)]);
     __builtin_prefetch(&units_[slot_of(key)]);
   }
