@@ -5,8 +5,8 @@ Each case is built several times, and medians are printed; cases that take more 
 built once. `tools/bench plot` draws the figures that --json prints.
 
 With --study FOLDER, an optional external reference program (see study.py) runs before every build.
-The ratio is CPU seconds of the whole `voxdag build` (reading, artifacts, merge, final file) divided
-by CPU seconds of the reference's build in memory.
+The column "ratio" is the CPU seconds of `voxdag build` (reading, artifacts, merge, final file)
+divided by the CPU seconds of the reference's build in memory.
 """
 
 import argparse
@@ -33,7 +33,7 @@ SHORT_CASES = [
     "minecraft_terrain:16384",
     "wooden_staircase:16384",
 ]
-LONG_S = 60  # of one build
+LONG_S = 60  # a case is not repeated after a build of more wall seconds than this
 
 
 def measure_case(case, options, study, folder):

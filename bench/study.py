@@ -35,7 +35,8 @@ class Study:
         for path in self.source.iterdir():
             if path.suffix in (".h", ".cpp"):
                 shutil.copyfile(path, self.folder / path.name)
-        # The sources can contain an aligned load on a heap object that is not 32-byte aligned.
+        # The sources can contain an aligned load from a heap object that is not 32-byte aligned. It
+        # is replaced by an unaligned load.
         header = self.folder / "build.h"
         text = header.read_text().replace("_mm256_load_si256(", "_mm256_loadu_si256(")
         header.write_text(text)
@@ -57,7 +58,7 @@ class Study:
         return scene in MESHES or scene == HAIRBALL
 
     def mesh_of(self, scene, scene_path):
-        """The scene as .obj: the mesh in the folder, or converted."""
+        """Returns the path of the scene as .obj: the mesh in the folder, or the converted scene."""
         mesh = self.folder / f"{scene}.obj"
         if not mesh.exists():
             if scene in MESHES:

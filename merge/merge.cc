@@ -24,7 +24,7 @@ class Merger {
          Checkpoint* checkpoint)
       : inputs_(inputs),
         context_(context),
-        // Passes before the final one also need memory for the writer of their segment.
+        // All passes except the final pass also need memory for the writer of their segment.
         pass_bytes_(context.plan.partition_bytes -
                     std::min(context.plan.partition_bytes, kSegmentWriterBytes)),
         pending_(inputs, narrow_words),

@@ -43,8 +43,8 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
 // Merges sub-DAGs into one artifact at the end of `out`, with all their roots. Equal rows of
 // different sub-DAGs become one, so a later merge has fewer rows to read. There must be at least
 // one input. Throws Error{kOutOfMemory} if one pass cannot merge all sub-DAGs and no two neighbors
-// can be merged either: together they need more memory than the budget has, or have over 2^32 rows.
-// Throws Error{kLimit} if a level of the artifact would have over 2^32 rows.
+// can be merged either, because any two need more memory than the budget has or have over 2^32 rows
+// together. Throws Error{kLimit} if a level of the artifact would have over 2^32 rows.
 ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, SegmentWriter& out,
                               MemoryBudget& budget, unsigned threads, Progress& progress,
                               const CancelToken& cancel, MergeReport& report);

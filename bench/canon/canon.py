@@ -4,7 +4,7 @@
     tools/canon [--quick] [--scenes FOLDER] [--voxdag COMMAND] [--write]
 
 A case is a scene, a resolution and geometry options. Generated scenes need no download; for the
-others, --scenes names a folder with the files. Cases whose file is not there are listed as absent.
+others, --scenes names a folder with the files. Cases whose file is missing are listed as absent.
 
 - --quick: only the cases on generated scenes below a resolution of 4096
 - --voxdag: the program, or a command such as "qemu-aarch64 -L SYSROOT build/aarch64/voxdag"

@@ -63,7 +63,7 @@ RULES = (("--thin",), ("--solid", "winding"), ("--solid", "parity"), ("--solid",
 
 
 def cases_of(scene, resolutions, rules=()):
-    """Returns a shell for every resolution, and a build by each rule at the lowest resolution."""
+    """Returns a case without options for every resolution, and one with each rule at the lowest."""
     shells = [Case(scene, r, has_exports=r == resolutions[0]) for r in resolutions]
     return shells + [Case(scene, resolutions[0], rule) for rule in rules]
 

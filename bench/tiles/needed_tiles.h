@@ -1,8 +1,8 @@
 // Finds the tiles that a viewer needs to draw a picture. A tile is needed if, without it, the first
-// cell of some ray would be coarser than requested. Let a tile have its
-// root at level l. The tile that refers to this root also stores a mask of 4x4x4 cells below the
-// root (query/tiles/tile.h). So a viewer without the tile has the cells of levels l + 1 and l + 2.
-// It needs the tile only for the cells of level l + 3 and finer levels.
+// cell of some ray would be coarser than requested. Let a tile have its root at level l. The tile
+// that refers to this root also stores a mask of 4x4x4 cells below the root (query/tiles/tile.h).
+// So a viewer without the tile has the cells of levels l + 1 and l + 2. It needs the tile only for
+// the cells of level l + 3 and finer levels.
 #pragma once
 
 #include <algorithm>
@@ -66,8 +66,8 @@ class NeededTiles {
     if (level < 2) return;  // the root's tile contains these children
     const uint32_t bricks = dag_.grid_levels() - 2;
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth) {
-      // The tile above a tile contains the cells down to two levels below the lower tile's root. So
-      // the root of the tile with the children is at least two levels above the cell.
+      // A tile with its root at level l is needed only for cells of level l + 3 and finer levels.
+      // The children are at level + 1, so the root of their tile is at level - 2 or above.
       uint32_t root = std::min(level - 2, bricks);
       while (root > 0 && (bricks - root) % depth != 0) --root;
       if (root == 0 || root == bricks) continue;

@@ -12,8 +12,8 @@
 //
 //   crosses    n_a is not 0, and for every edge the value
 //                  g = (w_b - u_b)(p_c - u_c) - (w_c - u_c)(p_b - u_b)
-//              has the sign of n_a. If g = 0, the sign is the sign of -(w_c - u_c), or of
-//              (w_b - u_b) if that is 0. If c < b, the order of these two is reversed.
+//              has the sign of n_a. If g = 0, the sign of -(w_c - u_c) counts, or if this is 0, the
+//              sign of (w_b - u_b). If c < b, the sign of (w_b - u_b) is tested first.
 //   beyond     F = n.(p - v) has the sign of n_a: the crossing is before p on the row. If F = 0,
 //              the sign is the sign of the first component of n that is not 0.
 //   sign       +1 where a ray along +a enters the solid that the triangle bounds, which is where

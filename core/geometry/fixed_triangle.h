@@ -8,7 +8,8 @@
 
 namespace voxdag {
 
-// Lattice units along the edge of a voxel, kUnitsPerVoxel, and log2 of this number.
+// kUnitsPerVoxel is the number of lattice units along the edge of a voxel. kUnitBits is log2 of
+// this number.
 inline constexpr int kUnitBits = 8;
 inline constexpr int64_t kUnitsPerVoxel = int64_t{1} << kUnitBits;
 // Maximum magnitude of a coordinate, so that products of the overlap test fit in 128 bits.

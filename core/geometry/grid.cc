@@ -52,7 +52,7 @@ double largest_extent(const WorldBounds& bounds) {
 // Two doubles in a vector register, which every supported processor has.
 using Pair = double __attribute__((vector_size(16)));
 
-// Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which may have a fraction.
+// Returns floor(x) for |x| <= 2^51, and otherwise a number near x, which can have a fraction.
 // Rounds to the nearest integer, and subtracts 1 if this has rounded up. There is no branch,
 // because the CPU would mispredict a branch for half of all numbers.
 Pair floor_of(Pair x) {

@@ -5,12 +5,12 @@
 //
 //   1. the maximal empty cubes of the octree with an edge of at least B;
 //   2. in every aligned block of B^3 voxels that has a voxel of the shell, each 6-connected
-//      component of the block's other voxels.
+//      component of the block's empty voxels.
 //
 // Corners are the corners of blocks. A sample row is a line along an axis through corners. From a
 // corner, the view along an axis sums the crossings (crossing.h) of the row in both directions:
 //
-//   left     sum of the signs of the row's crossings that the corner is beyond
+//   left     sum of the signs of the crossings before the corner
 //   total    sum of the signs of all crossings of the row
 //   winding  view = left - (total - left)
 //   parity   view = (left mod 2) + ((total - left) mod 2)

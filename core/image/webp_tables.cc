@@ -133,8 +133,9 @@ uint32_t read_copy_value(BitReader& bits, uint32_t symbol) {
 }
 
 // Reads an image that is encoded with one set of codes. Returns the largest number that red (high
-// byte) and green (low byte) of a pixel form. Only literal pixels are compared, because copies and
-// the color cache repeat earlier pixels.
+// byte) and green (low byte) of a pixel form. In the image that selects tables, this number is the
+// index of a set of tables. Only literal pixels are compared, because copies and the color cache
+// repeat earlier pixels.
 uint32_t read_small_image(BitReader& bits, uint64_t pixels) {
   const uint32_t cache = cache_size(read_cache_bits(bits));
   const PrefixCode green = read_code(bits, kLiterals + kLengthCodes + cache),

@@ -81,7 +81,7 @@ class FileSystem {
   virtual ~FileSystem() = default;
   virtual std::unique_ptr<ReadableFile> open_read(const std::string& path) = 0;
   // Like open_read(), but throws Error{kInvalidInput} if `path` is a symbolic link. For files that
-  // voxdag wrote to a folder in which other users may also create files.
+  // voxdag wrote to a folder in which other users can also create files.
   virtual std::unique_ptr<ReadableFile> open_own(const std::string& path) = 0;
   // Creates an empty file at `path`, or empties an existing file. Throws Error{kInvalidInput} for a
   // symbolic link and for a file with other hard links; so do open_write() and try_lock().
@@ -99,7 +99,7 @@ class FileSystem {
   // Creates the directory and its missing parents, and syncs their names. Throws
   // Error{kInvalidInput} if the directory or a parent exists but is a file.
   virtual void make_directories(const std::string& path) = 0;
-  // Creates the directory, whose parent must exist, unless it exists. Does not sync its name.
+  // Creates the directory if it does not exist. Its parent must exist. Does not sync its name.
   // Throws Error{kInvalidInput} if a file has this name.
   virtual void make_directory(const std::string& path) = 0;
   // Removes an empty directory.
@@ -148,8 +148,8 @@ std::string read_own_file(FileSystem& files, const std::string& path, uint64_t l
 // syncs and renames this file, and syncs the directory.
 void write_file_atomically(FileSystem& files, const std::string& path, std::string_view contents);
 // The first two steps of write_file_atomically(). The first writes and syncs the file with the name
-// `path` + ".partial". The second renames it to `path`, or removes it if that fails. Afterwards the
-// caller syncs the directory.
+// `path` + ".partial". The second renames this file to `path`, or removes it if the renaming fails.
+// Afterwards the caller syncs the directory.
 void write_partial_file(FileSystem& files, const std::string& path, std::string_view contents);
 void rename_partial_file(FileSystem& files, const std::string& path);
 // Removes the file that write_partial_file() wrote. Ignores errors.

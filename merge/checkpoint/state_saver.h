@@ -32,7 +32,7 @@ class StateSaver {
 
   // Returns the durable state; nullopt if none exists. Throws Error{kCorrupt} if it is damaged.
   std::optional<MergeState> load() const;
-  // Adds a file that the loaded state names.
+  // Adds a file that the loaded state names to named().
   void add_named(std::shared_ptr<ScratchPath> path) { named_.push_back(std::move(path)); }
   std::span<const std::shared_ptr<ScratchPath>> named() const { return named_; }
   // Discards the durable state and its files.

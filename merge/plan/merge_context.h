@@ -22,7 +22,7 @@ namespace voxdag {
 class MergeProgress {
  public:
   explicit MergeProgress(Progress& progress) : progress_(progress) {}
-  // Begins with a total of `total` rows, of which an earlier run merged `done`.
+  // Begins with a total of `total` rows. A resumed merge has already merged `done` of them.
   void begin(uint64_t total, uint64_t done) {
     progress_.begin_stage("merge", total_ = total, "nodes");
     progress_.resume_at(done);

@@ -7,8 +7,8 @@
 //   hash partition   all remaining memory, at least partition_bytes
 //
 // The hash partition limits the number of runs that one pass merges, because it must hold two
-// frames of every run. With this minimum, all rows of any one hash fit in a partition, unless a run
-// has more than two frames with rows of this hash.
+// frames of every run. So all rows with the same hash fit in one partition, unless a run has more
+// than two frames with rows of this hash.
 #pragma once
 
 #include <algorithm>

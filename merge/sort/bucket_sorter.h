@@ -32,7 +32,8 @@ class BucketSorter {
   // Returns the unique rows of the bucket that was sorted last.
   const MergedRows& unique() const { return unique_; }
   // Returns the position of every row of the bucket, relative to the bucket's first position. The
-  // rows are in the order of the slices, and within a slice in the slice's order.
+  // rows are in the order of HashPartition::slices(). A slice has the rows of one run, and their
+  // order is kept.
   std::span<const uint32_t> positions() const { return {positions_.data(), row_count_}; }
   // Returns the number of positions that the unique rows take.
   uint64_t extent() const { return extent_; }
@@ -41,7 +42,7 @@ class BucketSorter {
   struct Entry {
     uint64_t hash;
     uint32_t row_and_mask;  // high bits: mask; low bits: the row's index in positions()
-    uint32_t word;          // first word of the row in the partition
+    uint32_t word;          // index of the row's first word in the partition
 
     uint32_t row() const { return row_and_mask & 0xffffff; }
     uint8_t mask() const { return static_cast<uint8_t>(row_and_mask >> 24); }

@@ -133,7 +133,8 @@ SubvolumeBuild::SolidNode SubvolumeBuild::split_solid(int size_log2, const Latti
     const LatticeCube child = cube.child(c);
     children[c] = build_child(size_log2 - 1, child, entries.first[c], entries.counts[c]);
     is_empty &= children[c].is_empty;
-    // Building the next children advances the running rows, so the views are read now.
+    // Reads the views now, because building the next children advances the running views
+    // (running_rows.h).
     if (children[c].is_empty) views[c] = solid_->empty_cube(child);
   }
   entries_used_ = below;

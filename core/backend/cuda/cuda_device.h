@@ -45,9 +45,9 @@ class CudaDevice {
   void send_staging(size_t count, FixedTriangle* to, const std::string& where);
 
   // Pinned host memory for downloads. It is retained from one build to the next until
-  // release_download_area(), before which all downloads must have finished.
-  // allocate_download_area() returns false if the system has not enough memory. The device must not
-  // have a download area then.
+  // release_download_area() is called. All downloads must have finished before that call.
+  // allocate_download_area() returns false if the system has not enough memory. Call it only if the
+  // device has no download area.
   bool allocate_download_area(uint64_t bytes, const std::string& where);
   void release_download_area() {
     download_area_.reset();

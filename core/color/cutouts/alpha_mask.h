@@ -44,7 +44,9 @@ class AlphaMask {
  private:
   struct Level {
     uint32_t width, height, row_words;
-    size_t any, all;  // first words of the any and all bits; the finest level shares its bits
+    // Positions in words_ at which the bits of any_visible() and all_visible() begin. For the finest
+    // level, both positions are equal.
+    size_t any, all;
   };
 
   bool bit(size_t first, uint32_t level, uint32_t x, uint32_t y) const {

@@ -45,7 +45,7 @@ class VisiblePart {
     double texel[2];  // position in the image, in texels
   };
   struct Polygon {
-    // Cutting by a cube's six planes adds at most six corners to a triangle's three. Rounding may
+    // Cutting by a cube's six planes adds at most six corners to a triangle's three. Rounding can
     // add a few more.
     static constexpr int kMaxPoints = 16;
     int count = 0;
@@ -58,8 +58,8 @@ class VisiblePart {
 
   // The outline of a polygon in the image: its box and its edges.
   struct Outline {
-    // The edge's function nu * (u - from[0]) + nv * (v - from[1]) is 0 on the edge, and from
-    // `least` to `most` on the polygon.
+    // The edge's function is nu * (u - from[0]) + nv * (v - from[1]). It is 0 on the edge. Its
+    // values on the polygon are from `least` to `most`.
     struct Edge {
       double nu, nv, from[2], least, most;
     };

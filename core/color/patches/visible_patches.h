@@ -1,6 +1,7 @@
 // The voxels in which a triangle is visible, as patches: triangles that together touch exactly
 // these voxels. A patch is a degenerate triangle along an axis, or half of a rectangle in a layer
-// of voxels. Its corners are inside voxels, so that no patch reaches another voxel.
+// of voxels. Its corners are inside voxels, so that no patch touches a voxel in which the triangle
+// is not visible.
 #pragma once
 
 #include <array>

@@ -7,10 +7,10 @@
 //     void add(uint32_t cell, const SurfaceFacing& facing, uint32_t columns, uint32_t weight);
 //                                      // adds a triangle that covers `columns` columns of the cell
 //     void reset(uint32_t cell);       // drops everything added to the cell so far
-//     void finish();                   // between the last add() and the first get()
+//     void finish();                   // called between the last add() and the first get()
 //     void get(uint32_t cell, CellValues& values) const;
 //     void clear();
-//     uint64_t bytes() const;          // allocated
+//     uint64_t bytes() const;          // allocated bytes
 #pragma once
 
 #include <cstdint>

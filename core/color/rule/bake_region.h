@@ -10,7 +10,7 @@
 //     View view(uint32_t image, uint32_t level);
 // A View refers to a level. Its members are
 //     uint32_t width(), height();
-//     uint64_t texel(uint32_t x, uint32_t y);  // r lowest, then g, b, a
+//     uint64_t texel(uint32_t x, uint32_t y);  // 16 bits each: r lowest, then g, b, a
 //     void prefetch(uint32_t x, uint32_t y);
 #pragma once
 
@@ -41,9 +41,9 @@ namespace voxdag {
 template <class Textures>
 class RegionBaker {
  public:
-  // Upper bound of the memory that this object allocates. The bound excludes the sums of normals
-  // and materials, which exist if the constructor's `wanted` has them, and vectors that callers
-  // pass.
+  // Upper bound of the memory that this object allocates. The bound excludes vectors that callers
+  // pass. It also excludes the sums of normals and materials, which exist only if the constructor's
+  // `wanted` contains these attributes.
   static constexpr uint64_t kMaxBytes = color::RegionCells::kMaxBytes + (uint64_t{1} << 20);
   // Maximum number of cells of a region that a triangle touches. Along the triangle's dominant
   // axis, the region has 64^2 columns of cells. The triangle's plane touches at most 4 cells of
@@ -188,7 +188,7 @@ class RegionBaker {
     static constexpr size_t kBatch = 32;
     struct Cell {
       int64_t p, q;
-      uint32_t columns, cell, weight;  // `cell` is the code, and after cover() the cell's number
+      uint32_t columns, cell, weight;  // `cell`: the Morton code, after cover() the number
       typename color::SurfaceLook<Textures>::Spot spot;
     };
 

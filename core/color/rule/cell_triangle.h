@@ -14,16 +14,18 @@
 // A triangle covers a column of a cell if the column, which is a line, crosses the triangle within
 // the closed cell.
 //
-// Every test is the sign of a linear function with integer coefficients at a cell or column.
-// Divided by E (for cells) or E/4 (for columns), the function is A p + B q + C with integers A and
-// B. C is a quotient. It is rounded down or up to an integer, which changes no sign.
+// Every test computes the sign of a linear function at a cell or column. The function has integer
+// coefficients. Divided by E (for cells) or E/4 (for columns), it is A p + B q + C. A and B are
+// integers. C can be a fraction, and is rounded down or up to an integer. The rounding does not
+// change the sign.
 //
 // Bounds. Int is int64_t for triangles in the narrow box: coordinates v with 0 <= v + 2^27 < 2^29
 // (coordinates in the grid are at most 2^28). There, edges are below 2^29 and normals at most 2^58.
 // Edge functions are below 2^59 anywhere in the box, and at most 2^62 when added over 16 columns
-// inside the triangle. Values of the plane at columns of cells that the plane touches are below 10
-// n_2 < 2^62 in quarters; other intermediate values wrap around. Int is int128 for all other
-// triangles: coordinates are at most 2^40, normals at most 2^82, and n.v is below 2^124.
+// inside the triangle. If the plane touches a cell, the plane's function in quarters is below 10
+// n_2 < 2^62 at the cell's columns. Other intermediate values wrap around. Int is int128 for all
+// other triangles. Their coordinates are at most 2^40 and their normals at most 2^82, so the
+// product n.v is below 2^124.
 #pragma once
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// The side, area and material of a triangle, from which the normals and materials of cells are
-// computed. docs/color.md, "Other attributes", states the rule.
+// The orientation, area and material of a triangle, from which the normals and materials of cells
+// are computed. docs/color.md, "Other attributes", states the rule.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,16 @@
 
 namespace voxdag::color {
 
-// The integer that stands for the area of one column's cross section in the components of
-// SurfaceFacing::area. The cross section is 1/16 of a cell's face.
+// Unit of SurfaceFacing::area. This integer stands for 1/16 of the area of a cell's face, which is
+// the cross section of the square prism around one column.
 inline constexpr double kColumnArea = 1 << 20;
 
 // A triangle's contribution to each cell that it touches.
 struct SurfaceFacing {
-  // A vector along the triangle's normal. Its length is the area of the triangle's part in one
-  // covered column. Its dominant component is the area of this part's projection along the column,
-  // so the component's magnitude is kColumnArea. All components are 0 for a triangle without area.
+  // A vector along the triangle's normal. Its length is the area of the triangle's part in the
+  // prism around one covered column. Its dominant component is the area of this part's projection
+  // along the column, so the component's magnitude is kColumnArea. All components are 0 for a
+  // triangle without area.
   int64_t area[3] = {};
   bool is_backward = false;  // the normal's dominant component is negative
   uint32_t material = 0;

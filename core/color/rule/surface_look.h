@@ -230,8 +230,8 @@ class SurfaceLook {
   }
 
   // Returns the alpha, 0 to 255, that the material's alpha mode makes of `alpha`, which is 0 to
-  // 65535. With a mask, the mode kMask always gives 255, because the mask has already excluded
-  // hidden texels.
+  // 65535. If `is_cut` is set, the mode kMask always gives 255, because the mask of the cutouts has
+  // already excluded hidden texels.
   VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
     if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
     if (material_.alpha_mode == AlphaMode::kMask)

@@ -6,11 +6,11 @@
 //   artifact:  [frames of the bricks] [frames of level L-3] ... [frames of its top level] [index]
 //
 // A row is a node or a brick. A frame has kFrameRows consecutive rows of one level; the last frame
-// of a level may have fewer. Frames store rows by columns (all hashes, all masks, all children). A
-// column is compressed if that saves enough. The index lists the roots, levels and frames of the
-// artifact, with the checksum of each frame's stored bytes. An ArtifactRef has the position and the
-// checksum of the index, so a reader never scans a segment. The artifact of one subvolume has one
-// root; a merge pass writes artifacts with many roots.
+// of a level can have fewer rows. Frames store rows by columns (all hashes, all masks, all
+// children). A column is compressed if that saves enough. The index lists the roots, levels and
+// frames of the artifact, with the checksum of each frame's stored bytes. An ArtifactRef has the
+// position and the checksum of the index, so a reader never scans a segment. The artifact of one
+// subvolume has one root; a merge pass writes artifacts with many roots.
 //
 // Writers check rows before they write them, and readers check them again: rows are sorted by
 // (hash, mask, children), masks are not 0, and children are rows of the level below. Readers also

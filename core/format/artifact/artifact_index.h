@@ -28,7 +28,7 @@ struct ArtifactIndex {
 // Maximum size of the index of an artifact: enough for 3 * 10^10 rows.
 inline constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
 // Throws Error{kCorrupt} if the index of the artifact at `ref` is larger than kMaxIndexBytes. Call
-// this before allocating memory for the index, because `ref` may come from a damaged file.
+// this before allocating memory for the index, because `ref` can come from a damaged file.
 void check_index_bytes(const ArtifactRef& ref, const std::string& where);
 
 // Throws Error{kLimit} if the artifact has too many roots or frames. The message begins with

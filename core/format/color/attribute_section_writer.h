@@ -33,8 +33,8 @@ class AttributeSectionWriter {
   // The levels of `file` must be complete and not empty. The set cells of the levels 0 to
   // `cell_levels` have the attribute. `cell_levels` is at least 2, and at most the number of grid
   // levels, which is at most 20. If the values are indices in a list of names, `names` is this
-  // list. For colors without `encode_coarse`, the color of a
-  // coarser tier's cell is computed from the cell's sum (see EncodeColors).
+  // list. For colors, if `encode_coarse` is null, the color of a coarser tier's cell is computed
+  // from the cell's sum (see EncodeColors).
   AttributeSectionWriter(GlobalFileWriter& file, Attribute attribute, uint32_t cell_levels,
                          std::span<const std::string> names, MemoryBudget& budget,
                          EncodeColors encode_coarse = nullptr);

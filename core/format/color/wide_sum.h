@@ -29,7 +29,7 @@ struct WideSum {
   }
 
   // Returns the number of low bits that narrow() must drop so that the sum fits a ColorSum; 0 if
-  // it already fits. Leaves one high bit free, because narrow() may round values up.
+  // it already fits. Leaves one high bit free, because narrow() can round values up.
   int excess_bits() const {
     uint128 all = seen_weight | weight;
     for (size_t c = 0; c < 3; ++c) all |= seen[c] | plain[c];

@@ -59,8 +59,8 @@ struct Kernels {
   // (TileViews::classes_at()).
   void (*find_components)(const VoxelBlock& block, const int32_t (&classes)[8],
                           BlockComponents& out);
-  // Adds to `reached`, which must be a part of `empty`, all voxels of `empty` that are connected to
-  // it by steps between 6-neighbors within `empty`.
+  // Extends `reached`, which must be a part of `empty`, to all voxels that a path of 6-neighbors
+  // within `empty` connects to it.
   void (*flood)(const Slices& empty, Slices& reached);
   // Adds `voxels` to a block, in which they must be empty. Returns the number of added voxels.
   uint32_t (*add_slices)(const Slices& voxels, VoxelBlock& block);

@@ -7,10 +7,10 @@
 namespace voxdag::cpu {
 namespace {
 
-constexpr int kBlocks = RunningRows::kRows - 1;  // along a tile's edge
+constexpr int kBlocks = RunningRows::kRows - 1;  // blocks along a tile's edge
 
-// True if points on the plane count as above it, because the rule of crossings moves every point by
-// an infinitely small vector (core/geometry/crossing.h).
+// True if points on the plane count as above it. The rule of crossings decides this, because it
+// moves every point by an infinitely small vector (core/geometry/crossing.h).
 bool ties_are_above(const Plane& plane) {
   return (plane.n[0] != 0 ? plane.n[0] : plane.n[1] != 0 ? plane.n[1] : plane.n[2]) > 0;
 }
@@ -24,9 +24,10 @@ int64_t value_at_low(const Plane& plane, int64_t f) {
   return f - (plane.fractional || ties_are_above(plane) ? 0 : 1);
 }
 
-// `has[side]`: a corner of a block is on this side (0: below, 1: above). `views[side]`: the sum of
-// the three views from these corners. If no corner is on a side, this side counts as outside. All
-// its voxels are in the shell, so there is nothing to fill.
+// Returns the inner sides; nullopt if both are inside the solid but only one of them is disputed.
+// `has[side]`: true if corners of blocks are on this side (0: below, 1: above). `views[side]`: the
+// sum of the three views from each of these corners. If no corner is on a side, this side counts as
+// outside. All its voxels are in the shell, so there is nothing to fill.
 std::optional<PlaneViews::Sides> sides_of(const bool (&has)[2], const int32_t (&views)[2]) {
   const InnerSides inner{has[0] && is_inside(views[0]), has[1] && is_inside(views[1])};
   const bool below = inner.below && is_disputed(views[0]);

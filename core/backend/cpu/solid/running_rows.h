@@ -32,7 +32,7 @@ class RunningRows {
   }
   // Returns the views from the corners of a cube that no triangle touches. `low` and `edge` are in
   // tiles. Call it when all tiles up to the cube's last tile (in octree order) have been processed,
-  // and no later tile.
+  // and before a later tile is processed.
   UnitViews corners_of(const int (&low)[3], int edge);
 
  private:

@@ -25,7 +25,7 @@ class SolidFill {
             SubDagTables& tables, FullNodes& full);
 
   // For a tile of 64^3 voxels with a single triangle, which covers the tile (plane_views.h):
-  // returns the inner sides of the triangle's plane. Returns nullopt if the tile needs
+  // returns the inner sides (plane.h) of the triangle's plane. Returns nullopt if the tile needs
   // begin_tile(), add() and fill_tile(). If the tile's node can be made with these sides, call
   // pass_plane() with the number of filled voxels. `f` and `is_turned` are as for
   // PlaneViews::read().

@@ -146,7 +146,8 @@ void TileFiller::fill_block(int index, uint64_t key) {
     return;
   }
   memo_.count_miss();
-  // No corners are of the same class, so each component becomes a separate entry.
+  // All corners get different classes, so that find_components() makes a separate entry for each
+  // component. See BlockComponents in slices.h.
   constexpr int32_t kClasses[8] = {0, 1, 2, 3, 4, 5, 6, 7};
   kernels_.find_components(block, kClasses, components_);
   insert_units(key, block);

@@ -90,7 +90,7 @@ class TileFiller {
   std::vector<BlindComponent> blind_;
   BlockComponents components_;
   UnitsMemo memo_;
-  uint64_t keys_[kTileBlocks];  // of the blocks with voxels, in Morton order
+  uint64_t keys_[kTileBlocks];  // block_key() of each block with voxels
   // Arguments of fill().
   TileBricks* tile_ = nullptr;
   const int64_t* tile_low_ = nullptr;

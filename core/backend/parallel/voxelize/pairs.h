@@ -51,7 +51,7 @@ struct CubePlace {
 
 // The count step: finds the parts of each pair's cube that the pair's triangle touches. The parts
 // are the cube's children (N = 2) or, if the cube is a brick, its voxels (N = 4). With the rule
-// kThin, the voxels are those that the rule sets.
+// kThin, the step finds the voxels that this rule sets.
 template <int N, VoxelRule kRule>
 struct CountParts {
   CubePlace place;
@@ -127,8 +127,8 @@ struct PairSpan {
 template <class Space>
 class PairExpansion {
  public:
-  // Pairs descend `depths` levels from the subvolume. If `to_voxels` is set, the last of these
-  // levels is the level of bricks, and one more step turns its pairs into voxels. `window`:
+  // Pairs are expanded over `depths` levels below the subvolume. If `to_voxels` is set, the last of
+  // these levels is the level of bricks, and one more step turns its pairs into voxels. `window`:
   // capacity of a frame in pairs, at least 64.
   PairExpansion(Space& space, const SubvolumeTask& task, int depths, bool to_voxels,
                 uint32_t window)
