@@ -125,7 +125,7 @@ void update_row(SqlDatabase& database, const std::string& table, const std::stri
 }
 
 // Returns a statement that selects the rows of `table`. `rest` is the end of the SQL statement,
-// which may filter and order the rows.
+// which can filter and order the rows.
 template <class Record>
 SqlStatement select_rows(SqlDatabase& database, const std::string& table,
                          const std::string& rest = "") {

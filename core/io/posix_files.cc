@@ -265,8 +265,9 @@ class PosixFileSystem : public FileSystem {
       if (errno != EWOULDBLOCK) fail("lock", path, errno);
       return nullptr;
     }
-    // Between open() and flock(), another process may have released its lock and removed the file.
-    // Then this lock is on a file without a name, so the file at `path` must be locked instead.
+    // Between open() and flock(), another process can release its lock and remove the file. Then
+    // this lock is on a file without a name, so the file that is now at `path` must be locked
+    // instead.
     struct stat held {
     }, named{};
     const bool same = fstat(fd, &held) == 0 && stat(path.c_str(), &named) == 0 &&

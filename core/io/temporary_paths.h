@@ -1,5 +1,6 @@
-// Temporary files and folders that a process removes if it ends before their owners can. Paths of a
-// killed process remain; the next command with the same output, or the user, removes them.
+// Temporary files and folders that a process removes if it ends before their owners can remove
+// them. Paths of a killed process remain; the next command with the same output, or the user,
+// removes them.
 #pragma once
 
 #include <string>

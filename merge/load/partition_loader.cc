@@ -14,7 +14,7 @@ namespace {
 constexpr size_t kFramesPerItem = 16;
 
 // Replaces row indices by positions: writes map[child] to `out` for each of `children`, as two
-// words if `wide` is set. `map` may have two words per position although `wide` is false: its width
+// words if `wide` is set. `map` can have two words per position although `wide` is false: its width
 // is chosen before its level is merged, for the maximum size of the merged level. `wide` is chosen
 // afterwards, for the actual size.
 void replace_all(std::span<const uint32_t> children, const uint32_t* map, bool wide_map, bool wide,

@@ -6,7 +6,7 @@
 // stored one after the other. They are in memory if they fit a limit, and otherwise in a scratch
 // file. One run's map, or a part of it, is loaded from this file on demand.
 //
-// Several threads may store different rows concurrently. Load only after the last store.
+// Several threads may store different rows concurrently. Call load() only after the last store().
 #pragma once
 
 #include <cstdint>

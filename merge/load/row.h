@@ -11,7 +11,8 @@
 //
 // A node's words are its children, one word each. In a wide level a child takes two words, the high
 // half first. A brick is represented as a node of mask 3 whose two words are the high and the low
-// half of its voxel mask. So (hash, mask, words lexicographically) is the total order of both.
+// half of its voxel mask. So the total order of bricks and of nodes is the order by hash, then by
+// mask, then by the words.
 //
 // The memory after a row is readable: kMaxRowWords words from the first word of any row, even if
 // the row has fewer words. So a row is copied without a branch on its number of words, which the

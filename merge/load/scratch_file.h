@@ -47,7 +47,7 @@ class ScratchFolder {
   std::atomic<uint64_t> bytes_written_{0};
 };
 
-// Owns the file with this name in the folder: the destructor removes it.
+// Owns the file with this name in the folder.
 class ScratchPath {
  public:
   ScratchPath(ScratchFolder& folder, std::string name) : folder_(folder), name_(std::move(name)) {}

@@ -44,8 +44,8 @@ class AlphaMask {
  private:
   struct Level {
     uint32_t width, height, row_words;
-    // Positions in words_ at which the bits of any_visible() and all_visible() begin. For the finest
-    // level, both positions are equal.
+    // Positions in words_ at which the bits of any_visible() and all_visible() begin. For the
+    // finest level, both positions are equal.
     size_t any, all;
   };
 

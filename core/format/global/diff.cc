@@ -195,7 +195,7 @@ class Differ {
   }
   static uint64_t child(const voxdag_reader::Node& node, int index) {
     if (!(node.child_mask >> index & 1)) return kAbsent;
-    // In a damaged file a pointer may equal kAbsent. Such a pointer must not count as an absent
+    // In a damaged file a pointer can equal kAbsent. Such a pointer must not count as an absent
     // child.
     return std::min(voxdag_reader::File::child(node, index), kAbsent - 1);
   }

@@ -1,7 +1,7 @@
 // Counts the voxels in which two global files differ, by walking both DAGs together. The results of
 // compared pairs of nodes are remembered, so the cost depends on the number of different pairs, not
-// on the number of voxels. The files must have the same grid; hash bits and the order of the nodes
-// may differ. The result does not depend on the number of threads.
+// on the number of voxels. The files must have the same grid. Their hash bits and the order of
+// their nodes can differ. The result does not depend on the number of threads.
 #pragma once
 
 #include <cstdint>

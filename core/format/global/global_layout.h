@@ -17,7 +17,8 @@ namespace voxdag::global_layout {
 inline constexpr uint64_t kMagic = 0x0a1a0a4741445689;  // 0x89 "VDAG" LF 0x1a LF
 inline constexpr uint32_t kVersion = 1;
 inline constexpr uint32_t kVersionWithFeatures = 2;
-// Feature bits of the header: a level is wide, the file has attribute sections.
+// Feature bits of the header. kWideLevels: at least one level is wide. kAttributes: the file has
+// attribute sections.
 inline constexpr uint64_t kWideLevels = 1;
 inline constexpr uint64_t kAttributes = 2;
 inline constexpr uint64_t kPageBytes = 4096;

@@ -113,7 +113,7 @@ class GlobalFileWriter {
   // Writes words [first, first + words.size()) of the current level. Disjoint ranges may be written
   // in any order and concurrently from several threads.
   void write_words(uint64_t first, std::span<const uint32_t> words);
-  // Ends the level once all its words were written and added to the checksums. Throws
+  // Ends the level. All its words must have been written and added to the checksums. Throws
   // Error{kLimit}, whose message names the level, if the level has more than 2^40 words.
   void end_level(const GlobalLevel& level);
 

@@ -377,7 +377,8 @@ class BasicColorCursor {
     return cells;
   }
 
-  // Moves the path to a cell. If the cell is not set, returns false, and the path ends above it.
+  // Changes path_ so that it ends at a cell. If the cell is not set, returns false, and path_ ends
+  // at the cell's finest set ancestor.
   bool descend(uint32_t level, uint64_t code) {
     if (dag_->empty()) return false;
     uint32_t shared = std::min(level, depth_);
