@@ -24,7 +24,7 @@ struct LoggedRequest {
 };
 
 struct LogEntry {
-  // Texts and literals become entries, so that most callers pass only a message.
+  // The constructors are not explicit, so that callers can pass a message as an entry.
   LogEntry(std::string text, LogLevel entry_level = LogLevel::kInfo, std::string job_id = "")
       : message(std::move(text)), level(entry_level), job(std::move(job_id)) {}
   LogEntry(const char* text) : message(text) {}

@@ -21,7 +21,7 @@ constexpr const char* kExportRecord = "export.json";
 constexpr uint64_t kMaxRecordBytes = uint64_t{1} << 20;
 constexpr size_t kMaxQueuedExports = 256;
 constexpr double kNoExportLimitS = 1e9;
-// An export that was running each time when the service ended more often than this fails.
+// An export fails if more than this number of its consecutive runs ended because the service ended.
 constexpr unsigned kMaxExportInterruptions = 3;
 constexpr const char* kExpectedRetry =
     ": send the request again, and report the defect if it fails again";
@@ -173,7 +173,8 @@ void Exports::clear(const Export& it) {
 }
 
 void Exports::remove_folder(const Export& it) {
-  // The record first: without it, the rest of an interrupted removal is not an export.
+  // Removes the record first: without it, the rest of an interrupted removal does not count as an
+  // export.
   if (files_.exists(path(it, kExportRecord))) files_.remove(path(it, kExportRecord));
   remove_tree(files_, folder(it));
 }

@@ -1,6 +1,6 @@
 // The exports of jobs' results: files in other formats, or .vdag files of a part of the result,
-// which clients download. Runs one export at a time, each in a separate process as a job, next to
-// the jobs and with its own memory limit. Thread-safe.
+// which clients download. Runs one export at a time, in a separate process like the process of a
+// job. An export runs concurrently with jobs and has its own memory limit. Thread-safe.
 //
 // An export is a folder, DATA/jobs/JOB/exports/ID, with its files and the record export.json. The
 // record is written before an export starts and after its files are complete, so a crash leaves
@@ -50,7 +50,7 @@ class Exports {
   };
   // Queues an export of a job that has succeeded. `request` is the text of an ExportSpec, `output`
   // the name of the (first) file. If the job has an export with the same request, returns it
-  // instead; if that one has failed, queues it again. Throws RequestError: kLimit if the job has
+  // instead; if that export has failed, queues it again. Throws RequestError: kLimit if the job has
   // too many exports, kBusy if too many are queued, kConflict if the job or the export is being
   // deleted.
   Added add(const std::string& job, const std::string& request, const std::string& output);
@@ -82,7 +82,8 @@ class Exports {
     Pause(Exports& exports, const std::string& job);
     ~Pause();
     Pause(const Pause&) = delete;
-    // Forgets the exports of the job. Call it once their files no longer have their names.
+    // Forgets the exports of the job. Call it after the job's folder was renamed to mark it as
+    // deleted.
     void forget();
 
    private:

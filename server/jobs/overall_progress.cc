@@ -56,9 +56,9 @@ std::vector<StageShare> long_stages(const GeometryOptions& options) {
 
 OverallProgress overall_progress(std::span<const StageProgress> begun,
                                  std::span<const StageShare> shares) {
-  // `shares_done` has the shares of all completed work, `shares_here` only the work of this
-  // attempt. Stages before the current long stage are complete. One that did not begin was not
-  // needed.
+  // `shares_done` is the sum of the shares of all completed work, and `shares_here` is the part of
+  // this sum that this attempt completed. Stages before the current long stage are complete. A
+  // stage that did not begin was not needed.
   double shares_done = 0, shares_here = 0, shares_passed = 0, all_shares = 0, spent_s = 0;
   const StageProgress* now = nullptr;  // the last long stage that has begun
   for (const auto& [name, share] : shares) {

@@ -44,8 +44,8 @@ inline constexpr std::array<const char*, 7> kJobStateNames = {
 
 inline const char* state_name(JobState state) { return kJobStateNames[static_cast<size_t>(state)]; }
 std::optional<JobState> parse_state(std::string_view name);
-// True for canceled, failed and succeeded. Only a retry changes the first two. The state succeeded
-// is final.
+// True for canceled, failed and succeeded. Only a retry changes the states canceled and failed. The
+// state succeeded is final.
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {

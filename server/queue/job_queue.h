@@ -99,7 +99,8 @@ class JobQueue {
 
   // Returns the Unix time of the last recorded change of a job's state; 0 if there is none.
   double last_event_s();
-  // Returns the last events (at most 256) with numbers above `number` of a job, oldest first.
+  // Returns the events of a job whose numbers are above `number`, oldest first. If there are more
+  // than 256, returns only the last 256.
   std::vector<JobEvent> events_after(const std::string& id, int64_t number);
   // Returns the job that was added with this key; nullopt if none exists. Throws
   // RequestError{kKeyReused} if the key was used with a different request.

@@ -19,13 +19,12 @@ struct PosterFormat {
   const char* ending;  // of the file's name
   const char* media_type;
 };
-// Returns the format of a poster, which its first bytes tell.
+// Returns the format of a poster, determined from its first bytes.
 PosterFormat format_of_poster(const std::string& poster);
 
 // Renders the view `auto`, whose camera is in the manifest of `spec`, and returns a JPEG file, or a
-// PNG file if this program was built without libjpeg.
-// Returns "" if the file has no voxels. Throws Error{kCorrupt} for a damaged file, and
-// Error{kCanceled}.
+// PNG file if this program was built without libjpeg. Returns "" if the file has no voxels. Throws
+// Error{kCorrupt} for a damaged file, and Error{kCanceled}.
 std::string render_poster(const voxdag_reader::File& file, const query::PackageSpec& spec,
                           Progress& progress, const CancelToken& cancel);
 

@@ -28,10 +28,10 @@ constexpr size_t kEndsPerRead = 100;
 constexpr double kMaxConnectS = 3;
 constexpr double kMaxWebhookSleepS = 1;
 constexpr double kStopIntervalS = 0.05;  // between checks of the attempts in progress
-// The HTTP library has no limit for the lines of an answer. With this limit, kMaxActive attempts
-// need little memory: what arrives within kStopIntervalS.
+// The HTTP library has no limit for the lines of an answer. With this limit, an attempt holds at
+// most this many bytes of its answer, plus the bytes that arrive within kStopIntervalS.
 constexpr uint64_t kMaxAnswerBytes = 256 << 10;
-constexpr double kMaxLookIntervalS = 60;  // in case that the clock was set
+constexpr double kMaxLookIntervalS = 60;  // because the clock can be set back
 constexpr double kForgetIntervalS = 600;
 constexpr size_t kMaxErrorBytes = 200;
 constexpr uint64_t kMaxSecretBytes = 1024;

@@ -1,7 +1,7 @@
-// Sends webhooks: when a job has ended whose request names a URL, posts a small JSON object to this
-// URL (docs/api.md, "Webhooks"). Each end of a job is delivered at least once, also after a
-// restart, unless all attempts fail. A slow receiver delays neither jobs nor deliveries to other
-// receivers. Thread-safe.
+// Sends webhooks: if the request of a job names a URL, posts a small JSON object to this URL when
+// the job has ended (docs/api.md, "Webhooks"). Each end of a job is delivered at least once, also
+// after a restart, unless all attempts fail. A slow receiver delays neither jobs nor deliveries to
+// other receivers. Thread-safe.
 //
 // One thread reads the ends of jobs from the queue, stores their deliveries, and starts attempts.
 // Each attempt has its own short-lived thread. The numbers of attempts in total and per receiver
@@ -42,8 +42,8 @@ class Webhooks {
     uint64_t pending = 0, attempts = 0, delivered = 0, failed = 0;
   };
   Statistics statistics();
-  // Starts no more attempts, and ends attempts in progress. They are repeated by the next service.
-  // Waits for the resolution of host names in progress, which cannot be ended.
+  // Starts no more attempts, and ends attempts in progress. The next service repeats the ended
+  // attempts. Waits for the resolution of host names in progress, which cannot be ended.
   void stop();
 
  private:
@@ -84,8 +84,8 @@ class Webhooks {
   std::list<std::unique_ptr<Attempt>> attempts_;
   int64_t last_event_ = 0;
   uint64_t seen_changes_ = 0;
-  bool looks_ = true;         // a delivery may be due
-  double next_due_s_ = 0;     // Unix time of the next look
+  bool looks_ = true;         // if true, a delivery is possibly due
+  double next_due_s_ = 0;     // Unix time at which the next delivery is due
   double last_look_s_ = 0;    // in wall_seconds()
   double next_forget_s_ = 0;  // in wall_seconds()
 

@@ -146,7 +146,8 @@ Json export_links(const std::vector<Route>& routes) {
   return links;
 }
 
-// Returns the OpenAPI links of an answer: of an answer that creates a job or an export.
+// Returns the OpenAPI links of an answer. Only the answers to requests that create a job or an
+// export have links.
 Json links_of(const Route& route, const Answer& answer, const std::vector<Route>& routes) {
   const auto has = [&](const char* schema) {
     return route.method == "POST" &&

@@ -39,9 +39,9 @@ void add_multipart(Response& response, const std::vector<ByteRange>& ranges, uin
   response.headers.emplace("Content-Type", "multipart/byteranges; boundary=" + boundary);
 }
 
-// Answers with a large file. The answer is the complete file (200), one
-// range or several ranges (206), or 304 (RFC 9110, sections 13 and 14). The ETag is the file's
-// SHA-256 in hex. Throws Problem (416).
+// Answers with a large file. The answer is the complete file (200), one range or several ranges
+// (206), or 304 (RFC 9110, sections 13 and 14). The ETag is the file's SHA-256 in hex. Throws
+// Problem (416).
 Response answer_with_file(const Request& request, std::shared_ptr<ReadableFile> file,
                           const std::string& sha256, const std::string& name) {
   const uint64_t size = file->size();

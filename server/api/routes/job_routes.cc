@@ -21,8 +21,8 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kMaxKeyChars = 255;
-constexpr size_t kMaxPageBytes = 512 << 10;  // a page of jobs ends after the first job with
-                                             // which it has at least this size
+// A page of jobs ends with the job that brings its size to at least this number of bytes.
+constexpr size_t kMaxPageBytes = 512 << 10;
 constexpr size_t kJobsPerRead = 16;
 // Maximum size of a stored request. The service keeps the request as long as the job, and includes
 // it in every answer about the job.

@@ -1,5 +1,5 @@
 // One row of the router's table: the form of a request, the role that it requires, and its answers.
-// The router checks requests against the row. The OpenAPI document is also made from it.
+// The router checks requests against the rows. The OpenAPI document is generated from the rows.
 #pragma once
 
 #include <cstdint>

@@ -14,7 +14,8 @@
 namespace voxdag::server {
 namespace {
 
-// Messages of an export reach clients of the API.
+// Spells an option in the messages of an export. Clients of the API receive these messages. So most
+// options are spelled as members of a request, and --memory as the setting of the service.
 std::string spell_export_option(std::string_view name, std::string_view value) {
   return name == "memory" ? "exports.memory of the service" : spell_as_member(name, value);
 }

@@ -35,7 +35,7 @@ class ProgressPipe : public Progress {
   void set_usage(uint64_t memory_bytes, uint64_t disk_bytes) override;
   void set_cluster_tasks(const ClusterTasks& tasks) override;
 
-  // Reports the failure that ends the job. `code` as in docs/errors.md, or "internal".
+  // Reports the failure that ends the job. `code` is a code of docs/errors.md, or "internal".
   void fail(const std::string& code, const std::string& text);
   // Reports the result of the finished job, RESULT of docs/api.md.
   void finish(const std::string& result_json);

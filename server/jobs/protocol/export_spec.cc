@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr double kMaxCell = 1 << 30;  // a region may extend beyond the grid
+constexpr double kMaxCell = 1 << 30;  // maximum coordinate; a region may extend beyond the grid
 
 RequestError invalid_export(const std::string& message) {
   return {RequestError::Kind::kInvalid, message};

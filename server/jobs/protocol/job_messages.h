@@ -51,7 +51,7 @@ using voxdag::ClusterTasks;
 struct WarningReported {
   Warning warning;
 };
-// "failure": the last message of a failed job. `code` as in docs/errors.md, or "internal".
+// "failure": the last message of a failed job. `code` is a code of docs/errors.md, or "internal".
 struct Failure {
   std::string code, text;
 };

@@ -1,7 +1,7 @@
 // The complete DAG of a running job that still computes colors or other attributes. At this time,
-// all levels are in the job's partial output file, but its header and its checksums are not. The
-// service reads them from the frame in the work folder (WorkFolder::frame_path()). The tiles are
-// the tiles of a file without attributes. Thread-safe.
+// all levels are in the job's partial output file, but the file's header and checksums are not. The
+// service reads header and checksums from the *frame*, a file in the work folder
+// (WorkFolder::frame_path()). The tiles are the tiles of a file without attributes. Thread-safe.
 #pragma once
 
 #include <memory>
