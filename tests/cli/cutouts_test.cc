@@ -42,8 +42,8 @@ class Cutouts : public CommandLine {
   }
 };
 
-// The hidden half of the quad sets no voxels. Threads, memory and subvolumes do not change the
-// bytes.
+// The transparent half of the quad sets no voxels. Options for threads, memory and the size of
+// subvolumes do not change the bytes.
 TEST_F(Cutouts, SkipLeavesOutHiddenVoxels) {
   for (const char* mode : {"MASK", "BLEND"}) {
     put("a.glb", half_quad(mode).glb());

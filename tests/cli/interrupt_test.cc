@@ -56,7 +56,7 @@ class Interrupt : public CommandLine {
 };
 
 // A build that SIGINT or SIGTERM interrupts exits with status 130 and leaves no output file. The
-// same command then resumes it, and writes the bytes of an uninterrupted build. A build may finish
+// same command then resumes it, and writes the bytes of an uninterrupted build. A build can finish
 // before its signal arrives, but at least one build must be interrupted.
 TEST_F(Interrupt, StopsAndResumes) {
   std::vector<std::string> clean = args_;
@@ -111,7 +111,7 @@ TEST_F(Interrupt, InsideAnImageDecoder) {
   EXPECT_LT(voxdag::wall_seconds() - signal_s_, 5);
 }
 
-// Stops extracts and exports after they have created their first file. A run may finish before its
+// Stops extracts and exports after they have created their first file. A run can finish before its
 // signal arrives, but at least one run must be interrupted.
 class InterruptExport : public Interrupt {
  protected:

@@ -41,8 +41,8 @@ TEST_F(View, ServesUntilItIsInterrupted) {
   }
 }
 
-// After the first line of output, `view` may still compute the cameras of a large file. SIGINT then
-// ends it with status 0.
+// When the first line of output appears, `view` can still be busy with computing the cameras of a
+// large file. SIGINT then ends it with status 0.
 TEST_F(View, EndsWhileItStarts) {
   ASSERT_EQ(run({"build", "m.glb", "-r", "2048", "-o", "large.vdag"}).status, 0);
   put(".stdout", "");

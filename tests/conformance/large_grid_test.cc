@@ -1,6 +1,7 @@
-// The grid is too large for the oracle, so the tests compare implementations that share no inner
-// loop. In such a grid a build uses all caches (of planes and their directions), tables that grow,
-// and subvolumes of many tiles.
+// Tests a grid that is too large for the oracle, so the tests compare implementations with
+// different inner loops. In such a grid, a build uses all caches (of planes and their directions),
+// tables grow, and a subvolume consists of many tiles (the cubes that the CPU backend draws one by
+// one).
 #include "tests/conformance/harness.h"
 
 namespace voxdag {

@@ -106,7 +106,8 @@ TEST_F(Seeds, RunOptionsNeverShow) {
       EXPECT_EQ(report.solid->interior, whole.solid->interior);
     }
   }
-  EXPECT_GE(interiors.size(), 3u);  // the cavity, the space between the spheres, and 0
+  // The counts for the cavity, for the space between the spheres, and 0 for open space.
+  EXPECT_GE(interiors.size(), 3u);
 }
 
 TEST_F(Seeds, PointsOutsideTheGridAreRefused) {

@@ -146,8 +146,8 @@ TEST_F(SolidBuilds, BoxFillsTheGrid) {
   }
 }
 
-// All voxels in a large box are set, although its interior has no triangles: cubes larger than a
-// subvolume, complete subvolumes, and cubes in subvolumes.
+// All voxels in a large box are set, although its interior has no triangles. The interior contains
+// empty octree cubes that are larger than a subvolume, equal to a subvolume, or inside a subvolume.
 TEST_F(SolidBuilds, CubesInABoxAreFull) {
   BuildSpec spec = spec_for(cube_mesh(256 * 100 + 1, 256 * 900 - 1), 1024);
   spec.geometry.solid = SolidName::kWinding;

@@ -1,5 +1,6 @@
-// Builds with --thin. Run options, copies, orientation and order of the triangles do not affect the
-// bytes. The counts of real scenes come from independent code.
+// Builds with --thin. Run options do not affect the bytes. Neither do duplicate triangles, or the
+// orientation and the order of the triangles. The expected counts for downloaded scenes were
+// computed by independent code.
 #include <algorithm>
 #include <filesystem>
 

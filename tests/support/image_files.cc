@@ -68,7 +68,8 @@ std::string png_file(const PngFormat& f, const std::string& pixels) {
 
 namespace {
 
-// Returns a JPEG file. prepare(jpeg) may choose its scans.
+// Returns a JPEG file. prepare(jpeg) can change settings such as the scans before the compression
+// begins.
 template <class Prepare>
 std::string compressed(uint32_t width, uint32_t height, int components, const std::string& pixels,
                        const Prepare& prepare) {

@@ -10,8 +10,8 @@ namespace {
 
 using Corner = std::array<int64_t, 3>;
 
-// Returns a child's corner in units of the child's edge. `axes` has the bits of x, y and z in
-// `child`.
+// Returns a child's corner in units of the child's edge. `axes` has the bits of the child's number
+// that select its half along x, y and z.
 Corner child_of(const Corner& corner, uint32_t child, const std::array<uint32_t, 3>& axes) {
   return {2 * corner[0] + (child & axes[0] ? 1 : 0), 2 * corner[1] + (child & axes[1] ? 1 : 0),
           2 * corner[2] + (child & axes[2] ? 1 : 0)};

@@ -9,19 +9,20 @@
 
 namespace oracle {
 
-// Returns the shell and all voxels that no walk of an empty cube of radius + 1 voxels per edge
-// covers. The walks begin outside the grid, where all voxels are empty.
+// An empty cube of radius + 1 voxels per edge walks in steps of one voxel along an axis. It begins
+// outside the grid, where all voxels are empty. Returns the shell and all voxels that the cube
+// cannot cover in this way.
 Voxels enclose(const Voxels& shell, int radius);
 
 struct SeededSolid {
   Voxels voxels;
-  bool is_enclosed = false;  // the walk does not leave the grid
+  bool is_enclosed = false;  // true if the cube cannot walk out of the grid
 };
-// Computes the solid that a walk of an empty cube of radius + 1 voxels per edge finds. At the start
-// of the walk, the voxel `seed` has the coordinates radius / 2 (rounded down) relative to the
-// cube's low corner. The solid consists of all voxels that no empty cube outside the walk contains.
-// If the walk leaves the grid, the result is computed as if the walk had no cubes. Returns nullopt
-// if the cube is not empty at the start.
+// An empty cube of radius + 1 voxels per edge walks from the voxel `seed`. At its first position,
+// this voxel has the coordinates radius / 2 (rounded down) relative to the cube's low corner.
+// Returns nullopt if the cube is not empty there. The solid consists of the voxels that no empty
+// cube covers, except at positions that the walk reaches. If the walk leaves the grid, the solid is
+// computed as if the walk reached no position.
 std::optional<SeededSolid> enclose_seed(const Voxels& shell, int radius,
                                         const std::array<int, 3>& seed);
 

@@ -1,6 +1,6 @@
-// Tests levels with 64-bit pointers on small scenes. For any memory and number of threads, the
-// merge writes the file of the oracle's DAG. This file passes `verify`, and has the same voxels as
-// the file with 32-bit pointers.
+// Tests wide levels (levels to which pointers have 64 bits) on small scenes. For any memory and
+// number of threads, the merge writes the file of the oracle's DAG. This file passes `verify`, and
+// has the same voxels as the file with 32-bit pointers.
 #include <gtest/gtest.h>
 
 #include "core/format/global/diff.h"
@@ -12,7 +12,8 @@ namespace voxdag {
 namespace {
 
 // The parameter is the number of words above which a level is wide. With the smaller value, all
-// levels except the highest ones are wide; with the larger value, only the bricks.
+// levels except the highest ones are wide. With the larger value, only the level of the bricks is
+// wide.
 class WideLevels : public testing::TestWithParam<uint64_t> {
  protected:
   // Checks that the merged file passes `verify`, has wide levels, and has the voxels of `narrow`.

@@ -15,7 +15,7 @@ class QueryFile {
  public:
   using Cells = std::set<voxdag::query::Position>;  // in lexicographic order
 
-  // Levels of over `narrow_words` words are wide.
+  // A level of more than `narrow_words` words is wide: pointers to its nodes have 64 bits.
   explicit QueryFile(const oracle::Voxels& voxels,
                      uint64_t narrow_words = voxdag::global_layout::kNarrowLevelWords)
       : levels_(voxdag::levels_of_resolution(static_cast<uint64_t>(voxels.edge()))) {

@@ -57,7 +57,8 @@ TEST(GltfGeometry, StripsAndFans) {
             (std::vector<Corners>{first_of_fan, second_of_fan}));
 }
 
-// A strip that is longer than a window of triangles continues in the next window without a gap.
+// The reader reads triangles in windows of 4096. A longer strip or fan continues in the next window
+// without a gap.
 TEST(GltfGeometry, LongStripAndFanCrossWindows) {
   constexpr size_t kVertices = 10000;
   std::vector<float> line;
@@ -335,8 +336,8 @@ TEST(GltfGeometry, RestartsKeepOneWinding) {
   for (const SurfaceTriangle& surface : surfaces_of(*open.source)) EXPECT_FALSE(surface.is_flipped);
 }
 
-// Rows may be longer than the windows, and there may be thousands. A cursor can begin at any
-// triangle.
+// Rows can be longer than a window (the triangles that the reader reads in one step), and there can
+// be thousands of rows. A cursor can begin at any triangle.
 TEST(GltfGeometry, RestartsCanBeReadFromAnyTriangle) {
   std::vector<std::vector<uint32_t>> rows(3);
   for (uint32_t i = 0; i < 9000; ++i) rows[1].push_back(i);
@@ -422,7 +423,8 @@ TEST(GltfGeometry, SkinAtRest) {
   const int parent = scene.add_root({{"translation", {10, 0, 0}}, {"children", {child}}});
   scene.add("skins", {{"joints", {parent, child}}, {"inverseBindMatrices", bind}});
   scene.add_root({{"mesh", mesh}, {"skin", 0}, {"translation", {1000, 0, 0}}});
-  // Joint 0 moves by (10 0 0), joint 1 by (10 0 3) - (2 0 0).
+  // Joint 0 moves vertices by (10 0 0). Joint 1 moves them by (8 0 3): its node by (10 0 3), its
+  // inverse bind matrix by (-2 0 0).
   const Corners expected = {{{10, 0, 0}, {9, 0, 3}, {9, 1, 1.5}}};
   EXPECT_EQ(triangles_of_file(scene.glb()), (std::vector<Corners>{expected}));
 }

@@ -83,8 +83,8 @@ TEST(PlySurfaces, AlphaOfEveryFamily) {
             (Color{kRed[0], kRed[1], kRed[2], 32768}));
 }
 
-// For types other than uchar, the largest number in the file decides which number is full
-// intensity.
+// For types other than uchar, the range of the colors (the number that means full intensity)
+// follows from the largest number in the file.
 TEST(PlySurfaces, RangesOfColors) {
   const auto color = [](const std::string& type, const std::string& values) {
     return color_of(triangle(properties(type, {"red", "green", "blue"}), values));

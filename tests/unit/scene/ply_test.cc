@@ -32,8 +32,9 @@ TEST(Ply, TriangleInEveryFormatAndLineEnding) {
                 std::vector<Corners>{kLowHalf});
 }
 
-// Properties may have another order and other types. Other elements may come before and between the
-// needed ones, and lists of any width before and after the indices. Doubles keep all their digits.
+// Properties can have any order and any type. Other elements can be before and between the vertices
+// and the faces, and lists of any width before and after the vertex indices. Doubles keep all their
+// digits.
 TEST(Ply, OtherElementsAndPropertiesAreSkipped) {
   for (const PlyFormat format : kFormats) {
     PlyWriter ply(format);
@@ -73,8 +74,9 @@ PlyWriter mesh_header(PlyFormat format, size_t vertices, size_t faces, const cha
   return ply;
 }
 
-// Thousands of faces have 0 to 9 corners, which are on a parabola, so that the faces are convex.
-// The triangles are the faces' fans in order, from any first triangle.
+// Reads thousands of faces with 0 to 9 corners. The corners are on a parabola, so that the faces
+// are convex. Each face becomes a fan of triangles, in the order of the file. Reading can begin at
+// any triangle.
 TEST(Ply, PolygonsAreFansFromAnyTriangleOn) {
   constexpr uint32_t kVertices = 5000, kFaces = 5000;
   for (const PlyFormat format : kFormats) {
@@ -204,7 +206,8 @@ TEST(Ply, ColorsOfVertices) {
                                                   {300, -5, 77, 0, 0, 0, 0, 0, 0}))[0],
               (Rgba{65535, 0, linear_light(77 / 255.0), 65535}));
   }
-  // Without blue there are no colors.
+  // If the property `blue` is missing, the file counts as a file without colors, so the color is
+  // white.
   std::string file =
       colored_triangle<uint8_t>(PlyFormat::kLittle, "uchar", false, {0, 0, 0, 0, 0, 0, 0, 0, 0});
   file.replace(file.find("blue"), 4, "glue");
@@ -245,7 +248,8 @@ TEST(Ply, ColorsOfManyVertices) {
     }
 }
 
-// glTF and PLY files of one scene follow each other in the given order.
+// A scene of several glTF and PLY files has the triangles of all files, in the given order of the
+// files.
 TEST(Ply, FilesOfBothFormatsAreOneScene) {
   MemoryFiles files;
   files.contents["a"] = plain_triangle(PlyFormat::kLittle);
@@ -388,7 +392,8 @@ TEST(Ply, HostileTextIsRefused) {
             (std::vector<Corners>{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}}));
 }
 
-// If the windows do not fit the budget, the file is refused.
+// A file is refused if the buffers through which it is read (file_window.h) do not fit in the
+// budget.
 TEST(Ply, WindowsAreChargedToTheBudget) {
   const std::string file = plain_triangle(PlyFormat::kLittle);
   EXPECT_THROW(OpenScene(file, {}, 64 << 10), Error);

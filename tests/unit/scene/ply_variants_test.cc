@@ -81,7 +81,8 @@ TEST(PlyVariants, JoinsOfStripsAreLeftOut) {
             (std::vector<std::array<int, 3>>{{0, 1, 2}}));
 }
 
-// The only strip has more entries than a face may have corners. Reading can begin at any triangle.
+// The only strip has more entries than the largest number of corners that a face can have. Reading
+// can begin at any triangle.
 TEST(PlyVariants, LongStrips) {
   constexpr int kCount = 100000;
   std::vector<int> row;
@@ -165,7 +166,7 @@ TEST(PlyVariants, ListsOfVertices) {
   }
 }
 
-// A header may have comments, blank lines, unknown lines, and keywords in upper or lower case.
+// A header can have comments, blank lines, unknown lines, and keywords in upper or lower case.
 TEST(PlyVariants, TolerantHeaders) {
   const std::string plain = ascii_header(kListLine) + kRows;
   const std::string formats = "format ascii 1.0";

@@ -92,9 +92,10 @@ TEST(SceneRanges, AnyTriangleMayBeTheFirst) {
     }
 }
 
-// Two cursors take turns reading pieces of a scene of several windows, instances and files. Most
-// triangles use the first vertices, and the last triangles also use the last vertices; no triangle
-// uses the vertices between them.
+// Two cursors take turns reading pieces of a scene. The scene has several instances and files, and
+// each mesh has more triangles than a cursor reads in one step. Most triangles use the first
+// vertices, and the last triangles also use the last vertices. No triangle uses the vertices
+// between them.
 TEST(SceneRanges, CursorsDoNotDisturbEachOther) {
   SceneBuilder scene;
   constexpr int kNear = 3000, kFar = 80'000, kVertices = kFar + kNear;

@@ -134,8 +134,9 @@ TEST_F(ResumeTest, ResumesAfterAnInterruptionInAnyStage) {
   }
 }
 
-// A build that reorders the nodes also resumes after an interruption in build, merge or reorder.
-// The merge resumes its own file, which is removed at the end even if the work folder is kept.
+// A build that reorders the nodes also resumes after an interruption in build, merge or reorder. In
+// such a build, the merge writes a separate file, from which the stage `reorder` makes the output.
+// This file is removed at the end even if the work folder is kept.
 TEST_F(ResumeTest, ResumesABuildThatReordersTheNodes) {
   BuildSpec ordered = spec();
   ordered.geometry.order = OrderName::kFirstParent;
@@ -179,8 +180,8 @@ TEST_F(ResumeTest, MergesAgainIfTheFileToReorderIsDamaged) {
 }
 
 // A build with a different scene, resolution or number of hash bits does not resume the job in the
-// work folder: it fails, and the error names the difference. With `restart`, it starts over. Run
-// options may differ.
+// work folder: it fails, and the error names the difference. With `restart`, it starts over. A
+// build with different run options (RunOptions) resumes the job.
 TEST_F(ResumeTest, RefusesAnotherJobInTheSameFolder) {
   build_until(spec(), "build", 5);
   BuildSpec other = spec();
@@ -390,8 +391,8 @@ TEST_F(ResumeTest, SaysHowToResume) {
   }
 }
 
-// A build that ends before its first checkpoint is due syncs only its two results and the names of
-// both, and creates no job store.
+// A build that ends before its first checkpoint is due syncs only its output, its report and the
+// folder that contains them. It creates no job store.
 TEST_F(ResumeTest, AShortBuildSyncsOnlyItsResults) {
   BuildSpec short_build = spec();
   short_build.run.checkpoint_interval_s = 1e9;
@@ -425,7 +426,7 @@ class KillAtPublish : public ForwardingFiles {
 };
 
 // A short build that is killed between the renames of its output and of its report leaves no job
-// store. The same command may still replace the output, and another scene may not.
+// store. The same command can still replace the output. A build of another scene is refused.
 TEST_F(ResumeTest, AShortBuildMayReplaceTheOutputOfAKilledOne) {
   BuildSpec short_build = spec();
   short_build.run.checkpoint_interval_s = 1e9;

@@ -111,7 +111,7 @@ TEST_F(SceneWarnings, AnEmptySceneIsAnErrorThatSaysWhy) {
   EXPECT_EQ(build().warnings.back().code, "empty-scene");
 }
 
-// A scene whose triangles set no voxel is an error as well.
+// Without `allow_empty`, a scene whose triangles set no voxel is an error that states the reason.
 TEST_F(SceneWarnings, AVanishedSceneIsAnErrorThatSaysWhy) {
   write_scene("3 0 0 1\n", 1);
   spec_.geometry.thin = true;

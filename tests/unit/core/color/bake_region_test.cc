@@ -120,9 +120,9 @@ TEST(BakeRegion, TrianglesMayComeInParts) {
   }
 }
 
-// A cell that a triangle covers ignores triangles that only touch it. RegionBaker adds triangles
-// that only touch a cell at the end of the region, or earlier if there are too many of them. The
-// sums are the same in both cases.
+// A cell that a triangle covers (docs/color.md) ignores triangles that only touch it. RegionBaker
+// adds triangles that only touch a cell at the end of the region, or earlier if there are too many
+// of them. The sums are the same in both cases.
 TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   TestLooks looks;
   const ColorGrid grid{10, 2};

@@ -138,7 +138,7 @@ TEST(ErrorsDocTest, TableIsThatOfTheCode) {
 }
 
 // The example program compiles as its first lines describe: with C++17, and with the reader's
-// folder as the only include path. It finds the top of the pillar.
+// folder as the only include path. It prints the facts of the golden file kScene.
 TEST(ReaderExampleTest, CompilesOnItsOwnAndRuns) {
   if (std::system("c++ --version > /dev/null 2>&1") != 0) GTEST_SKIP() << "no c++ on this machine";
   TemporaryFolder folder;

@@ -94,8 +94,8 @@ TEST_F(COverlapTest, BoxesOverlapTheCellsInside) {
   EXPECT_LT(hits, 190);
 }
 
-// The expected result comes from sampled points of the segment. It is inexact, so capsules whose
-// distance is nearly their radius are left out.
+// The expected result comes from the distance between the cells and sampled points of the capsule's
+// segment. This distance is inexact, so a capsule is left out if the distance is nearly its radius.
 TEST_F(COverlapTest, CapsulesOverlapTheCellsWithinTheirRadius) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> at(-3, static_cast<double>(dag_.resolution()) + 3);

@@ -47,8 +47,8 @@ SumOf grays(size_t file) {
 
 class CombineColors : public Combine {
  protected:
-  // Writes the files a and b, whose voxels have the edge 1. Every second walk of b's voxels is in
-  // a, so that the files share voxels.
+  // Writes the files a and b, whose voxels have the edge 1. If their grids are equally large, half
+  // of the random voxels are in both files.
   void write(uint32_t levels_a, uint32_t color_a, uint32_t levels_b, uint32_t color_b,
              int count = 1500) {
     scenes_[0] = {levels_a, color_a, random_codes(21, levels_a, count), grays(0)};
@@ -194,7 +194,8 @@ TEST_F(CombineColors, AllOperations) {
   EXPECT_GT(from_b_, 1000u);
 }
 
-// The moved file has another resolution. Its cells align with the cells of the result, or not.
+// The moved file has another resolution. Tests offsets with which its cells align with the cells of
+// the result, and other offsets.
 TEST_F(CombineColors, Offset) {
   for (const auto& [color_a, levels_b, color_b] :
        {std::array{6u, 6u, 6u}, {6u, 5u, 3u}, {3u, 6u, 4u}, {4u, 7u, 2u}, {2u, 8u, 3u}}) {
@@ -214,7 +215,8 @@ TEST_F(CombineColors, Offset) {
   EXPECT_GT(from_b_, 500u);
 }
 
-// Results with the cells of one input have this input's bytes. The files have up to three tiers.
+// If the result has exactly the cells of one input, it has the bytes of this input. The color
+// sections have up to three tiers (docs/format.md).
 TEST_F(CombineColors, EqualVoxelsAreTheSameBytes) {
   for (const auto& [levels, color_levels] : {std::pair{9u, 9u}, {8u, 7u}, {16u, 15u}}) {
     SCOPED_TRACE(levels);

@@ -58,7 +58,7 @@ TEST_F(ExportSharing, VoxHasOneModelAndItsPlaces) {
 TEST_F(ExportSharing, PlayCanvasVoxelsHaveOneWordForEachPointer) {
   EXPECT_EQ(run("voxel").notes, std::vector<std::string>{});
   const auto json = nlohmann::json::parse(bytes_);
-  const uint32_t chain = kLevels - 2 - kTileLevels;  // nodes of one child
+  const uint32_t chain = kLevels - 2 - kTileLevels;  // number of nodes with only one child
   EXPECT_EQ(json["nodeCount"], 1 + 8 * kTileLevels + chain);
   EXPECT_EQ(json["numInteriorNodes"], kTileLevels + chain);
   EXPECT_EQ(json["numMixedLeaves"], 1);

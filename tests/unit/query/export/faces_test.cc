@@ -77,7 +77,7 @@ void expect_sorted(std::span<const RowBrick> sorted, size_t axis, std::vector<Te
   }
 }
 
-// Few bricks, and enough bricks for the radix sort, in a small and in the largest grid.
+// Sorts few bricks, and enough bricks for the radix sort, in a small grid and in the largest grid.
 TEST(Faces, BricksAreSortedByRows) {
   std::mt19937_64 random(2);
   for (const auto& [count, extent] : {std::pair{100, 32}, {5000, 64}, {3000, 1 << 18}}) {
@@ -98,7 +98,8 @@ TEST(Faces, BricksAreSortedByRows) {
   }
 }
 
-// Of a full cube, only the two sides are listed, without the faces between the sides.
+// For each axis, a full cube of several bricks is listed only by the bricks at its low and at its
+// high side. Each of these bricks has faces only on the outer side.
 TEST(Faces, FullCubesHaveTwoSides) {
   MemoryBudget budget(uint64_t{1} << 20);
   BrickRows rows(budget, 1, 16, "bricks");

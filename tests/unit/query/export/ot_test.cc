@@ -16,7 +16,8 @@ namespace voxdag::query {
 namespace {
 
 struct OtDecoded {
-  std::map<Position, voxdag_reader::Rgb> occupied;  // voxels, in cells from the octree's origin
+  // By position in cells, relative to the octree's origin.
+  std::map<Position, voxdag_reader::Rgb> occupied;
   uint64_t free_cells = 0, nodes = 0;
   std::string header;
 };

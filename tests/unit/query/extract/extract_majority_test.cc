@@ -135,8 +135,8 @@ TEST_F(ExtractMajority, KeepsTheVolume) {
             1.2 * volume);
 }
 
-// MajorityCells gives the same cells if its numbers of voxels do not fit in memory and are in
-// scratch files.
+// MajorityCells gives the same cells if its voxel counts do not fit in memory, so that it stores
+// them in scratch files.
 TEST_F(ExtractMajority, NumbersInScratchFiles) {
   const oracle::Voxels voxels = solid(3, 64);
   const oracle::Dag dag = oracle::build_dag(voxels, 64);

@@ -142,7 +142,8 @@ TEST_F(Extract, MemoryAndThreads) {
   EXPECT_TRUE(bytes("whole.vdag") == bytes("in.vdag"));
 }
 
-// Extracts read inputs with wide levels, and write wide levels where `narrow_words` requires them.
+// Extracts read inputs with wide levels (levels to which pointers have 64 bits). They write a level
+// as wide if it has more than `narrow_words` words.
 TEST_F(Extract, WideLevels) {
   const oracle::Voxels voxels = random_voxels(6, 64);
   const oracle::Dag dag = oracle::build_dag(voxels, 64);

@@ -301,8 +301,8 @@ TEST_F(Package, SurvivesDamagedBlocks) {
     EXPECT_THROW(decode_tile_block(block.substr(0, size), 6, 0, 1), Error);
 }
 
-// The viewer can take time to make, because it can have a poster. So it is not made if the output
-// is refused.
+// The files of the viewer can take time to make, because they can include a rendered picture
+// (poster). So they are not made if the output is refused.
 TEST_F(Package, ChecksTheOutputBeforeItMakesTheViewer) {
   const QueryFile scene(random_voxels(5, 8));
   const auto file = open_global_file(scene.path());

@@ -41,7 +41,8 @@ TEST(ShadeColors, SharingShowsHowOftenABrickOccurs) {
   EXPECT_LT(rare[1], 0.05);
 }
 
-// The middle of the scale is a brick whose number of places is the square root of the maximum.
+// The scale is logarithmic: a brick has the color in the middle of the scale if the number of its
+// occurrences in the grid is the square root of the largest number.
 TEST(ShadeColors, SharingIsLogarithmic) {
   oracle::Voxels voxels(64);
   for (int i = 0; i < 16; ++i) voxels.set(4 * i, 0, 0);

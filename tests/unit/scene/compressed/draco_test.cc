@@ -213,8 +213,8 @@ TEST(GltfDraco, SkinsAreCompressed) {
   EXPECT_EQ(triangles_of_file(compressed.glb()), triangles_of_file(plain.glb()));
 }
 
-// A strip's index count includes the triangles that join two strips, which Draco data do not
-// contain. The reader repeats the last face once for each of these triangles.
+// The index count of a strip includes the degenerate triangles that join two strips. Draco data do
+// not contain these triangles, so the reader repeats the last face once for each of them.
 TEST(GltfDraco, StripsHaveTheirFacesAndNoOthers) {
   const auto data = encode_draco(*bumpy_grid(4, false), draco::MESH_EDGEBREAKER_ENCODING, 10);
   SceneBuilder scene = compressed_scene(data, 25, 4 * 10 + 3 * 2);
@@ -269,8 +269,8 @@ TEST(GltfDraco, CountsOfTheDataAreRead) {
     }
 }
 
-// If faces do not share normals, only decoding shows the number of vertices, and large meshes are
-// not decoded for this check. Then more vertices than declared are an error; fewer are accepted.
+// If faces do not share normals, only decoding shows the number of vertices. Large meshes are
+// decoded late. Then more vertices than declared are an error, and fewer vertices are accepted.
 TEST(GltfDraco, CountsThatTheHeaderDoesNotShow) {
   const auto data = encode_draco(*bumpy_grid(60, true), draco::MESH_EDGEBREAKER_ENCODING, 10);
   const auto mesh = decode_draco(data);

@@ -21,8 +21,9 @@ inline std::string instance() {
   </technique_common></bind_material></instance_geometry>)";
 }
 
-// A COLLADA file with a triangle that two nodes draw. The inner node is moved by (0 10 0), the
-// outer one is scaled by 2. `extra` is added to the libraries, and `effect` is the diffuse color.
+// A COLLADA file with one triangle, which the node `outer` and its child `inner` draw. The inner
+// node is moved by (0 10 0), the outer node is scaled by 2. `extra` is the XML of more libraries,
+// and `effect` the XML of the material's diffuse color.
 inline std::string collada(const std::string& effect, const std::string& extra = "") {
   return R"(<?xml version="1.0"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">

@@ -134,7 +134,7 @@ TEST_F(ClusterMergeJob, WhoComesBackFollowsAndWhoStopsTheTasksStopsItFirst) {
   };
   const BuildReport report = run_build(merging_spec(), {system_files(), warnings_, never_});
   EXPECT_EQ(report.sha256, expected_);
-  EXPECT_EQ(count("sbatch"), 3u);  // the merge job, and two of sbatch --test-only
+  EXPECT_EQ(count("sbatch"), 3u);  // the merge job, and two calls of sbatch --test-only
   // The merge job has not canceled itself.
   for (const auto& command : slurm_.commands)
     EXPECT_FALSE(command[0] == "scancel" && command[1].ends_with("-merge"));

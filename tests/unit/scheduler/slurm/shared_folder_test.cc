@@ -17,9 +17,10 @@ namespace {
 class SharedFolder : public Cluster {
  protected:
   std::string cluster(const std::string& name) const { return output() + ".work/cluster/" + name; }
-  // Builds with two batches. Before the task of batch 1 runs, calls disturb(path) to create a file
-  // `name` in the cluster folder. Expects the right result, and a warning that `name` was rejected,
-  // which contains `warning`.
+  // Builds with two batches (each batch is the subvolumes of one Slurm task). Before the task of
+  // batch 1 runs, calls disturb(path), which creates the file `name` in the cluster folder. Expects
+  // that the result is right, and that a warning reports that `name` was rejected and contains
+  // `warning`.
   void expect_rejected(const std::string& name, const std::string& warning,
                        const std::function<void(const std::string& path)>& disturb) {
     SCOPED_TRACE(name);

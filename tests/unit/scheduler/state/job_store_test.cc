@@ -60,8 +60,9 @@ TEST_F(JobStoreTest, RemembersJobPlanAndResults) {
   EXPECT_EQ(store.stage_times()[0].largest_thread_share, 0.25);
 }
 
-// A store opened with kBuildLater has no file before a row must survive the process. Then the file
-// also has all earlier rows, and the names of the folder are synced before the file is created.
+// A store that is opened with kBuildLater keeps its rows in memory until a row must survive the
+// process. Then it creates its file, which also has all earlier rows. Before that, it makes the
+// names of the folder durable.
 TEST_F(JobStoreTest, CreatesItsFileWhenARowMustSurvive) {
   int synced = 0;
   {
@@ -142,8 +143,8 @@ TEST_F(JobStoreTest, RecordsSplitsAndLosses) {
   EXPECT_TRUE(leaves[2].summary.empty());
 }
 
-// If a subvolume is built but not recorded, it is still planned for other processes. A subvolume
-// that is marked for rebuild is planned for all processes.
+// Until a built subvolume is recorded, other processes see it as planned. If a subvolume is marked
+// for rebuild, all processes see it as planned.
 TEST_F(JobStoreTest, BuiltInMemoryIsKnownToTheWriterOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(3));
@@ -337,8 +338,9 @@ TEST_F(JobStoreTest, CanBeReadDuringABuild) {
   EXPECT_THROW(looker.set_progress(progress), Error);
 }
 
-// The stored progress of ingest remains when a job starts. It is removed on request, and when an
-// artifact is lost whose triangles were released. A damaged row is detected.
+// When a job starts, the stored progress of ingest remains. The store removes it on request, and
+// when an artifact is lost after the triangles of its subvolume were released. A damaged row is
+// detected.
 TEST_F(JobStoreTest, RemembersTheProgressOfIngest) {
   const std::vector<std::byte> record = {std::byte{3}, std::byte{0}, std::byte{200}};
   JobStore store(path(), JobStore::Access::kBuild);

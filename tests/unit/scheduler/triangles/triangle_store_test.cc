@@ -61,7 +61,7 @@ bool equal(const std::vector<FixedTriangle>& a, const std::vector<FixedTriangle>
 }
 
 // A bin returns its triangles in the order in which they were added: from memory or from disk, with
-// narrow and wide records, in batches of any size, and again after a rewind.
+// 32-bit or 64-bit ("wide") coordinates, in batches of any size, and again after a rewind.
 TEST_P(TriangleStoreTest, ReturnsWhatWasStored) {
   for (const bool wide : {false, true})
     for (const uint64_t share_bytes : {uint64_t{0}, uint64_t{20000}, uint64_t{1} << 30}) {

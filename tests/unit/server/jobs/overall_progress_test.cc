@@ -43,7 +43,8 @@ TEST(OverallProgress, WeightsTheStages) {
   EXPECT_EQ(overall_progress({}, kShares).eta_s, std::nullopt);
   std::vector<StageProgress> begun = {stage("scan", 5, 5, 3, true), stage("ingest", 5, 5, 2, true)};
   EXPECT_DOUBLE_EQ(overall_progress(begun, kShares).fraction, 0.1);
-  // 5 s for 10 shares; 90 shares are left.
+  // `scan` and `ingest` took 5 s. They are 10 of the 100 shares of the work, and 90 shares are
+  // left.
   EXPECT_DOUBLE_EQ(overall_progress(begun, kShares).eta_s.value(), 45);
 
   begun.push_back(stage("partition", 1, 4, 5, false));
@@ -51,7 +52,8 @@ TEST(OverallProgress, WeightsTheStages) {
   begun.back().ended = true;
   begun.push_back(stage("build", 16, 64, 15, false));
   EXPECT_DOUBLE_EQ(overall_progress(begun, kShares).fraction, 0.25);
-  // The rest of the stage takes 45 s at its rate. 25 shares took 25 s, and merge has 30.
+  // At the rate of its first quarter, the rest of the stage `build` takes 45 s. So far, 25 shares
+  // took 25 s, so the 30 shares of `merge` take 30 s.
   EXPECT_DOUBLE_EQ(overall_progress(begun, kShares).eta_s.value(), 45 + 30);
 
   begun.push_back(stage("merge", 0, 0, 1, false));
@@ -68,7 +70,8 @@ TEST(OverallProgress, TakesTheSpeedFromThisAttempt) {
   begun[0].resumed_at = 50;
   const OverallProgress progress = overall_progress(begun, kShares);
   EXPECT_DOUBLE_EQ(progress.fraction, 0.1 + 0.36);
-  // 10 of 100 units took 12 s, so 40 units take 48 s. 6 shares took 12 s, so 30 shares take 60 s.
+  // In this attempt, 10 of 100 units took 12 s, so the other 40 units take 48 s. These 10 units are
+  // 6 of the 60 shares of `build`, so the 30 shares of `merge` take 60 s.
   EXPECT_DOUBLE_EQ(progress.eta_s.value(), 48 + 60);
   begun[0].done = 50;
   EXPECT_EQ(overall_progress(begun, kShares).eta_s, std::nullopt);

@@ -39,7 +39,8 @@ TEST_F(Tables, BricksAreFoundAgain) {
   EXPECT_EQ(table.size(), truth.size());
 }
 
-// Slots are sorted by (truncated hash, mask), for full and for truncated hashes.
+// Slots are sorted by hash, and by mask if hashes are equal. The hashes have 64 bits or are
+// truncated to fewer bits.
 TEST_F(Tables, BricksAreSorted) {
   for (const uint32_t bits : {64u, 33u, 16u, 4u}) {
     SCOPED_TRACE(bits);

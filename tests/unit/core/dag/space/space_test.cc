@@ -162,7 +162,8 @@ void expect_joined(const SpaceGrid& grid, int axis, int edge) {
     for (uint32_t& s : set)
       if (s == from) s = to;
   });
-  // For each voxel of a component: the number of the component's set, plus 1. 0 for other voxels.
+  // For each voxel of a component: 1 + the number of the set of joined components to which the
+  // component belongs. 0 for all other voxels.
   std::vector<uint32_t> sets(grid.voxels.size());
   SpaceGrid walked(grid.size);
   for (int p = 0; p < 2; ++p)

@@ -101,7 +101,8 @@ TEST_F(ValueSectionTest, MaterialsAreAsWideAsTheyMustBe) {
   for (const size_t count : {1u, 256u, 257u, 65536u, 65537u}) check(scene, materials, count);
 }
 
-// A file can have any set of attributes, with and without wide levels.
+// A file can have any set of attributes, with and without wide levels (levels to which pointers
+// have 64 bits).
 TEST_F(ValueSectionTest, AreIndependent) {
   const ColoredScene scene{7, 6, random_codes(4, 7, 300), smooth_colors(6, 4)};
   for (int bits = 1; bits < 16; ++bits) {

@@ -209,8 +209,8 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenDag{"octree nodes counted", [](auto& dag) { --dag.svo_nodes; },
                   "octree nodes, the DAG has "}));
 
-// Adds a node to which no node refers to level 1, at its right position in the order. Returns the
-// node's index.
+// Adds a node without a parent to level 1, at its right position in the order. Returns the node's
+// index.
 uint64_t add_lonely_node(oracle::Dag& dag) {
   std::vector<oracle::Node>& nodes = dag.levels[dag.levels.size() - 2];
   const std::vector<oracle::Node>& below = dag.levels[dag.levels.size() - 3];
@@ -226,8 +226,9 @@ uint64_t add_lonely_node(oracle::Dag& dag) {
   return index;
 }
 
-// If several levels have nodes without a parent, the error names the first one of the coarsest
-// level. On this level, the table of `verify` has 64 bits for each value.
+// If several levels have nodes without a parent, the error names the first such node of the
+// coarsest of these levels. Here this is a level for which `verify` uses words of 64 bits
+// (subtree_table.h).
 TEST_F(VerifyTest, TheCoarsestNodeWithoutAParentIsNamed) {
   oracle::Dag dag = oracle::build_dag(random_voxels(7, 128), 64);
   add_lonely_brick(dag);

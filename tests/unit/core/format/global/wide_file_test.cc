@@ -19,7 +19,7 @@ using testing::HasSubstr;
 using testing::MatchesRegex;
 
 constexpr int kEdge = 64;
-constexpr uint64_t kNarrowWords = 50;  // above this, a level is wide; the bricks have more words
+constexpr uint64_t kNarrowWords = 50;  // a level of more words is wide, such as the bricks' level
 constexpr uint32_t kBrickLevel = 4;
 constexpr size_t kPointerBitsAt = 24;  // in a level's entry
 
@@ -127,7 +127,7 @@ TEST(WideNodeTest, HasPointersOfTwoWords) {
 TEST_F(WideFileTest, VersionAndFeaturesBelongTogether) {
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{0}).message(),
               HasSubstr("pointers of 64 bits, expected 32"));
-  // In version 1, bytes are reserved that are not 0 in this file.
+  // Bytes that are not 0 in this file are reserved in version 1.
   EXPECT_EQ(error_with(kVersionAt, uint32_t{1}).code(), ErrorCode::kCorrupt);
   make_narrow();
   EXPECT_THAT(error_with(kFeaturesAt, uint64_t{1}).message(), HasSubstr("reserved"));

@@ -46,8 +46,9 @@ TEST_P(SubtreeTableTest, KeepsTheValuesOfFullCubes) {
   EXPECT_EQ(table_.hash(4), 0u);
 }
 
-// A node with eight full children is a full cube. The hash is that of docs/format.md. Only the
-// referenced children have a parent afterwards, and their values are the same.
+// A node with eight full children is a full cube. Its hash is the hash of docs/format.md.
+// Afterwards, exactly the children to which the nodes refer are marked as having a parent. The
+// other values of the children are unchanged.
 TEST_P(SubtreeTableTest, ParentsHaveTheSumsOfTheirChildren) {
   const std::vector<uint32_t> words = {255, 0, 2, 4, 6, 8, 10, 12, 14, 129, 0, 14};
   voxdag_reader::Level nodes;
@@ -82,8 +83,8 @@ TEST_P(SubtreeTableTest, ParentsHaveTheSumsOfTheirChildren) {
   }
 }
 
-// From bricks to the children of the largest possible root. The limits of both layouts are
-// included.
+// The cubes are between a brick and a child of the largest possible root. The values include the
+// limits of both layouts of subtree_table.h.
 INSTANTIATE_TEST_SUITE_P(CubeLevels, SubtreeTableTest, testing::Values(2, 4, 5, 6, 19));
 
 // The first pointer that leads to no node ends the results, whether it is odd, beyond the end of

@@ -1,4 +1,5 @@
-// Tests which stored color cubes a later run of a build reuses, and which it bakes again.
+// Tests which cubes of the color grid a later run of a build reuses, and which cubes it bakes
+// again.
 #include <gtest/gtest.h>
 
 #include <algorithm>

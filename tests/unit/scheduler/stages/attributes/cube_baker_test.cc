@@ -18,7 +18,7 @@ const std::string kRecordsFile = "records";  // the file that errors of RegionRe
 
 struct Baked {
   CubeBaker::Records records;
-  size_t parts = 0;  // how often full records were taken before the end
+  size_t parts = 0;  // number of times that the baker handed over records before the end
 };
 
 class CubeBaking : public testing::Test {
@@ -131,7 +131,8 @@ TEST_F(SolidCubes, AreBakedByChildren) {
   for (RegionRecords records(kRecordsFile, whole.records[0]); const auto region = records.next();)
     cells += region->counts[0];
   EXPECT_EQ(cells, uint64_t{1} << 21);
-  // Records were handed over several times, so that only a few regions are in memory at any time.
+  // The baker handed over records several times, so that only a few regions are in memory at any
+  // time.
   EXPECT_GE(whole.parts, 4u);
   for (const uint64_t surface_bytes : {1 << 20, 2 << 10}) {
     const Baked by_children = bake(ColorMemory::kRegionBytes, surface_bytes);

@@ -10,8 +10,7 @@
 namespace voxdag::server {
 namespace {
 
-// True if the voxel is set in the DAG. Descends the words of the DAG without other code of the
-// service.
+// True if the voxel is set in the DAG. Reads the words of the DAG without calling the tested code.
 bool is_set(const PartialDag& dag, uint32_t levels, uint64_t root, uint32_t x, uint32_t y,
             uint32_t z) {
   uint64_t at = root;

@@ -29,7 +29,8 @@ namespace {
 using Cells = std::set<std::array<uint32_t, 3>>;
 
 constexpr uint64_t kResolution = 1024;
-constexpr uint32_t kCellDepth = 6;  // level of cells with a quarter of a subvolume's edge (64)
+// Level of the cells of 16 voxels per edge, a quarter of a subvolume's edge.
+constexpr uint32_t kCellDepth = 6;
 
 void add_cells(const query::DagView& dag, uint64_t node, uint32_t depth,
                const std::array<uint32_t, 3>& at, Cells& cells) {
@@ -259,7 +260,7 @@ TEST_F(PartialViewsTest, OfAFolderThatVanishesAreNotFound) {
   EXPECT_EQ(error_of([&] { look(views); }).code(), ErrorCode::kNotFound);
 }
 
-// A disk on which exists() blocks while `hangs` is true, until `go_on`.
+// A disk on which exists() waits for `go_on` if `hangs` is true.
 class HangingFiles : public ForwardingFiles {
  public:
   HangingFiles() : ForwardingFiles(system_files()) {}
