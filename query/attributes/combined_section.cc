@@ -32,7 +32,7 @@ using Position = std::array<int64_t, 3>;
 
 // In this file, levels and codes are levels and Morton codes of the result's grid, except where a
 // name begins with `file_`: these are levels and codes of a source's grid. A region is a color
-// region (combined_section.h).
+// region (combined_section.h), and a tier is a group of seven levels (docs/format.md, "Colors").
 
 Position position_of(uint64_t code) {
   uint32_t x, y, z;
@@ -345,8 +345,9 @@ class CombinedColors {
     }
     return kEncoded;
   }
-  // True if a region of a tier above the finest tier can be copied from the source, because it has
-  // the same regions in the tier below, and all of them were copied from the source.
+  // True if a region of a tier above the finest tier can be copied from the source. This is the
+  // case if the source's region contains the same regions of the tier below, and all of them were
+  // copied from the source.
   bool is_copied_coarse(const Source& source, uint64_t copied, uint64_t regions, uint32_t tier,
                         uint64_t code) const {
     if (copied != regions || !has_same_regions(source, tier)) return false;

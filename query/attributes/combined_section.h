@@ -19,10 +19,10 @@
 // The color of a coarser cell is the mean, in linear light, of the cell's finest cells. The other
 // attributes have rules for coarser cells (docs/format.md).
 //
-// Colors are stored in color regions of up to 64^3 cells. A color region in which all finest cells
-// have the colors of one file, and which this file stores with the same cells at an aligned place,
-// is copied byte for byte. The other color regions are encoded from decoded colors. The bytes
-// depend only on the contents of the inputs.
+// Colors are stored in color regions of up to 64^3 cells. A color region is copied byte for byte
+// from A or B if all its finest cells have the colors of that file, and the file stores a region
+// with the same cells at an aligned place. The other color regions are encoded from decoded colors.
+// The bytes depend only on the contents of the inputs.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// A cube of a level of a global file that has set voxels.
+// A cube with set voxels, on one level of a global file.
 #pragma once
 
 #include <cstdint>

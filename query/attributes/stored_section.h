@@ -1,6 +1,7 @@
-// The section of an attribute in a global file, for commands that copy colors or other values of it
-// to a new file. The callers read values from the mapped file. Before that, they call the check
-// functions, which verify the checksum blocks of these values with read calls, each block once.
+// The section of one attribute, such as the color, in a global file. Commands use it to copy values
+// of the attribute to a new file. The callers read values from the mapped file. Before that, they
+// call the check functions. These verify the checksum blocks of the values, each block once, with
+// read calls.
 //
 // docs/format.md, "The color section", defines tiers and regions.
 //

@@ -7,8 +7,9 @@
  *     voxdag_close(file);
  *
  * A position has three integers, x, y and z. It names a cell of the grid with 2^grid_levels cells
- * per edge: a voxel if `grid_levels` is the file's number of levels, or a larger cell if it is
- * less. A cell is set if any voxel in it is set. Every function that can fail returns a status;
+ * per edge. The cell is a voxel if `grid_levels` is the file's number of levels. With a smaller
+ * `grid_levels` it is larger. A cell is set if any voxel in it is set. Every function that can fail
+ * returns a status;
  * voxdag_error() returns the message of the last failure on the calling thread. A file is
  * immutable: any number of threads may query it concurrently. docs/library.md describes conventions
  * and units.
@@ -183,7 +184,7 @@ VOXDAG_API voxdag_status voxdag_list(const voxdag_file* file, uint32_t grid_leve
 /* Writes the bricks that have set cells in a region, in Morton order, to the array `bricks` of
  * length `capacity`. Leaves out the bricks that do not fit. A mask has only those set cells of
  * its brick that are in the region. Sets *count to the number of all bricks of the region, which
- * may be larger than `capacity`. To get only this number, use the capacity 0. */
+ * can be larger than `capacity`. To get only this number, use the capacity 0. */
 VOXDAG_API voxdag_status voxdag_bricks(const voxdag_file* file, uint32_t grid_levels,
                                        const voxdag_region* region, size_t capacity,
                                        voxdag_brick* bricks, size_t* count);

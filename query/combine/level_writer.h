@@ -1,7 +1,7 @@
 // Writes the levels of a combined DAG, from the bricks up. Each level is merged from three sorted
-// sequences of rows (result_rows.h): the kept nodes (pair_levels.h) of the first file, those of the
-// second file, and the results of the level's pairs. Equal rows become one node. So the levels are
-// canonical, as after a build.
+// sequences of rows (result_rows.h): the kept nodes (pair_levels.h) of the first file, the kept
+// nodes of the second file, and the results of the level's pairs. Equal rows become one node. So
+// the levels are canonical, as after a build.
 #pragma once
 
 #include <cstdint>

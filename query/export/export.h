@@ -90,7 +90,8 @@ struct ExportFormat {
   const char* second_suffix;
   ExportReport (*write)(const ExportJob& job);
   UpAxis up = UpAxis::kY;    // the axis that kOfFormat means
-  const char* options = "";  // names of ExportOptions except `up`, each after a space: " grid"
+  // Names of the other options (ExportOptions) of the format, each after a space: " grid band".
+  const char* options = "";
 };
 
 // Returns the formats that this build of voxdag supports. A format that needs a missing library is

@@ -61,9 +61,9 @@ constexpr uint16_t kZip64Version = 45;
 void put_member_fields(ByteSink& sink, const NpzMember& member, uint16_t extra_bytes) {
   sink.put(kZip64Version);  // version needed to read it
   sink.put<uint16_t>(0);    // flags
-  sink.put<uint16_t>(0);    // stored
-  sink.put<uint16_t>(0);    // midnight
-  sink.put<uint16_t>(33);   // 1980-01-01
+  sink.put<uint16_t>(0);    // compression method: stored
+  sink.put<uint16_t>(0);    // time: midnight
+  sink.put<uint16_t>(33);   // date: 1980-01-01
   sink.put(member.crc);
   sink.put(~uint32_t{0});  // both sizes are in the ZIP64 field
   sink.put(~uint32_t{0});

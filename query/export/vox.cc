@@ -139,8 +139,8 @@ class VoxWriter {
     find_instances(0, view_.root(), {0, 0, 0});
   }
 
-  // Returns the size of the file in bytes. If the size is over kMaxVoxBytes, the result may be any
-  // number over kMaxVoxBytes.
+  // Returns the size of the file in bytes. If the size is over kMaxVoxBytes, the result is only a
+  // lower bound of the size, but also over kMaxVoxBytes.
   uint64_t bytes() const {
     return std::max(min_bytes_, 8 + kChunkHeaderBytes + nodes_bytes() + models_bytes_);
   }
@@ -336,7 +336,7 @@ class VoxWriter {
   const uint64_t level_words_;
   NodeNumbers<uint32_t> models_;
   MemoryCharge charge_;
-  std::vector<uint64_t> voxels_;  // voxels of each model's node
+  std::vector<uint64_t> voxels_;  // number of voxels in each model
   uint64_t min_bytes_ = 0, models_bytes_ = 0;
   size_t instances_ = 0;
   uint64_t instance_bytes_ = 0;

@@ -9,8 +9,8 @@
 
 namespace voxdag::query {
 
-// The words of a color page (query/tiles/color_page.h), and the Morton code of its position in
-// pages.
+// The words of a color page (query/tiles/color_page.h), and the Morton code of the page's position.
+// The unit of the position is the edge of a page.
 struct CodedPage {
   uint64_t code = 0;
   std::vector<uint32_t> words;

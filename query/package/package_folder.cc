@@ -69,7 +69,7 @@ bool has_left_lock(FileSystem& files, const std::string& path) {
 }
 
 void remove_left_folders(FileSystem& files, const std::string& path) {
-  constexpr size_t kRandomCharacters = 6;  // of make_temporary_folder()
+  constexpr size_t kRandomCharacters = 6;  // at the end of make_temporary_folder()'s names
   const std::string prefix = path.substr(path.rfind('/') + 1) + kWorkSuffix;
   const std::string parent = parent_directory(path);
   for (const DirectoryEntry& entry : files.list(parent))
@@ -96,7 +96,7 @@ PackageFolder::PackageFolder(FileSystem& files, const std::string& path)
 
 void PackageFolder::publish(const PackageIndex& index) {
   files_.sync_directory(new_files());
-  refuse_other_folder(files_, path_);  // another program can have created it since
+  refuse_other_folder(files_, path_);  // checked again: another program can have created it since
   if (files_.exists(path_) && !files_.list(path_).empty()) {
     update(index);
   } else {

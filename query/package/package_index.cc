@@ -16,7 +16,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "voxdag package";
 constexpr int kVersion = 1;
-// Maximum depth of nested values in package.json, because formatting nested JSON recurses.
+// Maximum depth of nested values in package.json. Formatting nested JSON recurses, so a greater
+// depth could overflow the stack.
 constexpr int kMaxDepth = 32;
 constexpr size_t kMaxBands = 2 * (size_t{kMaxGridLevels} + 1);
 constexpr uint64_t kMaxNumber = uint64_t{1} << 53;  // integers up to this are exact in JavaScript
@@ -27,9 +28,9 @@ Json file_json(const PackageFile& file, bool is_pack) {
   return json;
 }
 
-// True if the file name `name` cannot lead out of the folder of the package, and is not the name of
-// a file without a hash in its name. An update of a package removes files by these names. They come
-// from package.json, which anyone may have written.
+// True if the file name `name` cannot lead out of the folder of the package, and is not
+// package.json or index.html, the two names without a hash. An update of a package removes files by
+// the names in package.json. Anyone could have written that file.
 bool is_safe_name(const std::string& name) {
   if (name == kIndexName || name == "index.html") return false;
   if (name.empty() || name[0] == '/' || name[0] == '.') return false;

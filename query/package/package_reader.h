@@ -1,4 +1,4 @@
-// Reads and checks a package (package_index.h). The files may be damaged or malicious, so all sizes
+// Reads and checks a package (package_index.h). The files can be damaged or malicious, so all sizes
 // in them are checked. Not thread-safe.
 #pragma once
 

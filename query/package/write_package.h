@@ -41,7 +41,7 @@ struct PackageSpec {
 };
 
 struct PackageReport {
-  uint64_t bytes = 0;  // of all files
+  uint64_t bytes = 0;  // total size of all files
   uint64_t files = 0;
   uint64_t packs = 0;
   uint64_t tiles = 0;
@@ -54,8 +54,9 @@ struct PackageReport {
 // contents.
 using ViewerMaker = std::function<std::vector<ViewerFile>()>;
 
-// Writes the package. Calls `make_viewer` after it has checked and locked the output folder,
-// because rendering a poster takes time. A package without a viewer has an empty `make_viewer`.
+// Writes the package. Calls `make_viewer` only after it has checked and locked the output folder,
+// because `make_viewer` can take long: it renders a picture. For a package without a viewer,
+// `make_viewer` is empty.
 // Throws Error:
 // - the errors of PackageFolder and of `make_viewer`;
 // - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled.

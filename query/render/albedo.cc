@@ -23,12 +23,13 @@ const std::array<double, 256>& linear_of() {
   return table;
 }
 
-// The color scale of Shade::kSharing in sRGB, from one place in the octree to the most places. Its
-// lightness increases, so that the scale can also be printed in gray.
+// The color scale of Shade::kSharing in sRGB. The first color is for nodes that occur once in the
+// octree, the last color for the most frequent brick. The lightness increases along the scale, so
+// that the scale can also be printed in gray.
 constexpr std::array<Vec, 5> kScale = {Vec{{0.27, 0.05, 0.37}}, Vec{{0.23, 0.32, 0.55}},
                                        Vec{{0.13, 0.57, 0.55}}, Vec{{0.37, 0.79, 0.38}},
                                        Vec{{0.99, 0.91, 0.14}}};
-// Colors of the levels, sRGB. Neighbor levels differ clearly.
+// Colors of the levels, sRGB. The colors of adjacent levels are easy to distinguish.
 constexpr std::array<Vec, 7> kLevelColors = {Vec{{0.90, 0.62, 0.00}}, Vec{{0.34, 0.71, 0.91}},
                                              Vec{{0.00, 0.62, 0.45}}, Vec{{0.94, 0.89, 0.26}},
                                              Vec{{0.00, 0.45, 0.70}}, Vec{{0.84, 0.37, 0.00}},
@@ -83,8 +84,8 @@ ShadeColors::ShadeColors(const DagView& dag, Shade shade) : dag_(dag), shade_(sh
   if (shade == Shade::kSharing && !dag.empty()) count_places();
 }
 
-// Counts the places of each node in the octree, from the root to the bricks. For each place of a
-// node, each of its children has one more place. Numbers that exceed 64 bits are UINT64_MAX.
+// Counts how often each node occurs in the octree, from the root to the bricks. The node's count is
+// added to the count of each of its children. Counts that exceed 64 bits are UINT64_MAX.
 void ShadeColors::count_places() {
   const uint32_t brick_level = dag_.grid_levels() - kBrickLevels;
   for (uint32_t level = 0; level <= brick_level; ++level)
@@ -108,8 +109,8 @@ void ShadeColors::count_places() {
   log_max_places_ = std::log(static_cast<double>(std::max<uint64_t>(most, 1)));
 }
 
-// Returns the number of places of the node or brick at the surface: a brick if the visible cell is
-// a brick or smaller.
+// Returns how often the node or brick of the visible cell occurs in the octree. If the cell is
+// smaller than a brick, this is the brick that contains the cell.
 uint64_t ShadeColors::places_at(const SurfaceHit& surface) const {
   const uint32_t brick_level = dag_.grid_levels() - kBrickLevels;
   const uint32_t end = std::min(surface.depth, brick_level);

@@ -60,10 +60,10 @@ class ShadeColors {
 
   const DagView& dag_;
   const Shade shade_;
-  // For each level, the number of places of each node or brick in the octree. The index of a node
-  // is half its word offset.
+  // For each level, how often each node or brick occurs in the octree. The count of the node at
+  // word offset `offset` is element offset / 2 of the level's vector.
   std::vector<std::vector<uint64_t>> places_;
-  double log_max_places_ = 0;  // logarithm of the largest number of places of a brick
+  double log_max_places_ = 0;  // logarithm of the largest count of a brick
 };
 
 // Returns the bytes that ShadeColors allocates.

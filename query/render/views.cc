@@ -42,8 +42,8 @@ constexpr uint64_t kMaxEnclosureSteps = uint64_t{1} << 22;
 constexpr uint64_t kMaxSearchSteps = uint64_t{1} << 25;  // for each of the two passes
 constexpr uint64_t kMaxBoxCells = uint64_t{1} << 25;
 
-// Casts rays that together may take a limited number of steps. If used_up() is true, the last ray
-// may have ended early, and results that depend on it must be discarded.
+// Casts rays until they have taken `max_steps` steps in total. If used_up() is true, it is possible
+// that the last ray ended before its hit, and results that depend on this ray must be discarded.
 class LimitedRays {
  public:
   LimitedRays(const DagView& dag, uint64_t max_steps, const CancelToken& cancel)

@@ -10,10 +10,10 @@
 
 namespace voxdag::query {
 
-// Memory limits for the new offsets of the nodes of one level.
+// Memory limits for the new offsets of the nodes of one level, in bytes.
 struct OffsetMemory {
-  uint64_t value_bytes = 0;   // up to this size, all offsets are in memory
-  uint64_t window_bytes = 0;  // otherwise, memory of a window of lookups (node_values.h)
+  uint64_t value_bytes = 0;   // if the level's offsets take more, they are stored on the disk
+  uint64_t window_bytes = 0;  // memory of a window of lookups (node_values.h) of stored offsets
 };
 
 // Writes all levels of `input` to `out`. The file must have voxels. Throws Error{kCorrupt} if a

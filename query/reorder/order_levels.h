@@ -28,9 +28,9 @@ struct OrderSpace {
 // Writes the levels of `file` in the given order to `out`, a new file with the same grid. The nodes
 // of `file` may be in any order that this program knows.
 //
-// Throws Error{kUnsupportedVersion} if `file` has an unknown order, or pointers of a size that
-// `out` would not choose. Throws Error{kCorrupt} if `file` is damaged. Also throws the errors of
-// writing to and reading from `space.folder`.
+// Throws Error{kUnsupportedVersion} if `file` has an unknown order, or if the pointers to a level
+// have 32 bits in `file` but would have 64 bits in `out`, or the reverse. Throws Error{kCorrupt} if
+// `file` is damaged. Also throws the errors of writing to and reading from `space.folder`.
 void order_levels(const voxdag_reader::File& file, NodeOrder order, const OrderSpace& space,
                   GlobalFileWriter& out, Progress& progress, const CancelToken& cancel);
 

@@ -51,7 +51,8 @@ class MergeJob {
   virtual ~MergeJob() = default;
 
   // Digest of the geometry options and of the paths, sizes and modification times of the scene's
-  // files, taken when this object is made. Image files are included if the build has attributes.
+  // files. It is computed when this object is made. It includes image files if the build has
+  // attributes.
   virtual const std::string& request() const = 0;
   // Returns the report of a finished merge job with the same request(), if its output exists and
   // has the size in the report.

@@ -88,7 +88,7 @@ class TemporaryFolder {
         if (!files_.exists(path + kTemporaryLock)) continue;
         if (const auto lock = files_.try_lock(path + kTemporaryLock)) remove_tree(files_, path);
       } catch (const Error&) {
-        // Another task may be removing the folder.
+        // Another task is possibly removing the folder at the same time.
       }
     }
   }
@@ -314,7 +314,7 @@ Allocation slurm_allocation() {
   const uint64_t per_node = environment_number("SLURM_MEM_PER_NODE");
   const uint64_t per_cpu = environment_number("SLURM_MEM_PER_CPU");
   given.memory_bytes = (per_node ? per_node : per_cpu * std::max(given.cpus, 1u)) << 20;
-  // default_memory() is half of the memory that RAM and cgroup allow, so this limit is all of it.
+  // default_memory() is half of the memory that RAM and cgroup allow, so twice that is all of it.
   given.memory_bytes = std::min(given.memory_bytes, 2 * default_memory());
   const char* const job = std::getenv("SLURM_ARRAY_JOB_ID");
   const char* const index = std::getenv("SLURM_ARRAY_TASK_ID");

@@ -109,7 +109,7 @@ std::optional<BuildReport> SlurmMergeJob::finished() const {
         context_.files.open_read(spec_.run.output)->size() == report.bytes)
       return report;
   } catch (const Error&) {
-    // The file is not a report of such a job.
+    // The output or the report is missing, or the file is not a report.
   }
   return std::nullopt;
 }

@@ -26,7 +26,7 @@ class RowFile {
   RowExtent append(std::span<const std::byte> bytes);
   // Compresses `numbers` and appends the compressed bytes.
   RowExtent append_rows(std::span<const int32_t> numbers);
-  // Both functions throw Error{kCorrupt} if the bytes are damaged.
+  // read() and read_rows() throw Error{kCorrupt} if the bytes are damaged.
   std::vector<std::byte> read(const RowExtent& extent) const;
   void read_rows(const RowExtent& extent, std::span<int32_t> out) const;
   const std::string& path() const { return path_; }

@@ -72,7 +72,7 @@ class SolidRows {
   bool is_ready() const { return file_ != nullptr; }
   // Starts an empty file.
   void start();
-  // Makes all added rows and the members below durable.
+  // Makes all added rows, `full_cubes` and `counts` durable.
   void save();
 
   SolidRule rule() const { return rule_; }

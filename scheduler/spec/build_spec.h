@@ -78,7 +78,7 @@ std::string geometry_json(const GeometryOptions& options);
 // threads.
 struct ClusterOptions {
   ClusterEngine engine = ClusterEngine::kNone;
-  uint64_t tasks = 0;          // 0: chosen by the expected work
+  uint64_t tasks = 0;          // 0: the build chooses a number from the expected work
   uint64_t max_running = 0;    // max concurrent tasks; 0 for no limit
   std::string submit_options;  // more sbatch options, split as by a shell
   std::string program_path;    // path of voxdag, the same on all machines; "": this program

@@ -173,7 +173,7 @@ void ArtifactCache::remove(const DirectoryEntry& entry) {
   try {
     files_.remove(folder_ + "/" + entry.name);
   } catch (const Error&) {
-    // Another build removed it first.
+    // Another build has already removed the entry.
   }
 }
 

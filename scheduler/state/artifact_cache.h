@@ -56,7 +56,7 @@ class ArtifactCache {
   const std::string folder_;
   const uint64_t limit_bytes_;
   std::mutex mutex_;          // guards known_bytes_
-  uint64_t known_bytes_ = 0;  // bytes of entries when last listed, and of entries added since
+  uint64_t known_bytes_ = 0;  // size of the entries at the last listing, plus entries added since
   std::atomic<uint64_t> partials_{0};
 };
 

@@ -55,8 +55,8 @@ class JobProgress : public Progress {
 
  private:
   enum class Write { kIfDue, kUnlessEarly, kNow };
-  // Changes the snapshot. Writes it if a write is due. Before that, kUnlessEarly writes it if the
-  // store has a file, and kNow always writes it.
+  // Changes the snapshot. Writes it to the store if the next periodic write is due. If it is not
+  // due yet, kUnlessEarly writes the snapshot if the store has a file, and kNow always writes it.
   template <class Change>
   void update(Write write, const Change& change);
   void write(bool is_early);

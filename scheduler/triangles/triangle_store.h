@@ -44,7 +44,8 @@ class TriangleStore {
   // Maximum number of records that a caller should pass to add_chunk().
   virtual size_t max_chunk_records() const = 0;
 
-  // Creates the bins of the plan's cubes, once per store. A resumed store may already have them.
+  // Creates the bins of the plan's cubes. Must not be called if the store has them already, because
+  // an earlier run created them.
   virtual void add_cube_bins(std::span<const Cube> cubes) = 0;
   virtual const std::vector<CubeBin>& cube_bins() const = 0;
   // Creates a bin for a part of a split subvolume. The caller copies triangles from the bin `whole`

@@ -50,18 +50,18 @@ struct RowBrick {
 
 class BrickRows {
  public:
-  // `bricks` and `cube_sides` are the numbers of bricks that will be added: single bricks, and the
-  // bricks of one side of each full cube. `what` names the memory in error messages. Throws
-  // Error{kOutOfMemory}.
+  // `bricks` is the number of single bricks that will be added. `cube_sides` is the sum, over all
+  // full cubes that will be added, of the bricks on one side of the cube. `what` names the memory
+  // in error messages. Throws Error{kOutOfMemory}.
   BrickRows(MemoryBudget& budget, uint64_t bricks, uint64_t cube_sides, std::string_view what);
 
   // `low` is a low corner in cells. A full cube has at least 8 cells per edge, all of them set.
   void add(const Position& low, uint64_t mask);
   void add_full_cube(const Position& low, int64_t edge);
 
-  // Sorts the bricks by the slabs and rows of an axis, and returns them. Of a full cube, the list
-  // has only the bricks at its two sides perpendicular to the axis. Must be called for the axes 0,
-  // 1 and 2 in this order.
+  // Sorts the bricks by the slabs and rows of an axis, and returns them. For a full cube, the list
+  // has only the bricks on the two sides of the cube that are perpendicular to the axis. Must be
+  // called for the axes 0, 1 and 2 in this order.
   std::span<const RowBrick> sorted(int axis);
 
  private:

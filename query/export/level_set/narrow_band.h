@@ -152,7 +152,7 @@ void for_each_band_part(const DagView& dag, const Selection& selection, int widt
   BandWalk(dag, selection, width, visit_leaf, visit_full).run();
 }
 
-// True if a set cell of the DAG's grid has only set cells around it: 26 cells.
+// True if some set cell of the DAG's grid is surrounded by set cells: all its 26 neighbors are set.
 bool has_inside(const DagView& dag, const CancelToken& cancel);
 
 }  // namespace voxdag::query

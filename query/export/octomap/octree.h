@@ -1,5 +1,5 @@
-// OctoMap's octree, for the exports to .bt and .ot. The octree has 16 levels. The origin of the
-// octree's coordinates is its center. The exporter rounds the position of the grid to a whole
+// OctoMap's octree, for the exports to .bt and .ot. The octree has 16 levels. The origin of its
+// coordinates is the center of the octree. The exporter rounds the position of the grid to a whole
 // number of cells, so that the origin of the octree is at most half a voxel from the origin of the
 // scene. After this shift, octree cubes are in general not cubes of the grid. So the exporters read
 // the cells of one octree block after the other, 32^3 cells each, and make the nodes from these

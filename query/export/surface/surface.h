@@ -3,8 +3,8 @@
 // rectangle has one color.
 //
 // With `--outside`, the surface has only faces that are visible from outside: the empty cell at the
-// face is connected, through empty cells of the complete grid, with the space around the grid. In
-// that case the border of the region has no faces where the scene continues.
+// face is connected, through empty cells of the complete grid, with the space around the grid. So a
+// set cell at the border of the region has no face toward a set cell outside the region.
 #pragma once
 
 #include <array>
@@ -82,9 +82,10 @@ class Surface {
   uint64_t listed_bricks_ = 0;  // number of bricks that are sorted for each axis
   const std::array<BrickRowOrder, 3> orders_ = {BrickRowOrder(0), BrickRowOrder(1),
                                                 BrickRowOrder(2)};
-  std::array<std::vector<Run>, 16> runs_;  // of the current row of bricks: 4 planes, 4 rows each
-  std::vector<size_t> row_;                // scratch of merge()
-  std::array<PlaneRow, 4> planes_;         // of the current slab
+  // Runs in the current row of bricks (brick_rows.h): 4 planes with 4 rows of faces each.
+  std::array<std::vector<Run>, 16> runs_;
+  std::vector<size_t> row_;         // scratch of merge()
+  std::array<PlaneRow, 4> planes_;  // planes of the current slab (brick_rows.h)
   GrowingBuffer<SurfaceRectangle> rectangles_;
 };
 

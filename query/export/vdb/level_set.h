@@ -50,8 +50,8 @@ VdbSize level_set_size(const ExportJob& job, const Selection& selection, const V
 }
 
 // Returns the level set of the selected voxels. Leaves have exact distances, limited to the width
-// of the band. Tiles have only the right sign. Throws Error{kInvalidInput} if the file's voxels are
-// a surface without an inside.
+// of the band. In a tile of the OpenVDB tree (a cube with one value), only the sign of the value is
+// right. Throws Error{kInvalidInput} if the file's voxels are a surface without an inside.
 inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t leaves) {
   if (!has_inside(job.dag, job.cancel))
     throw Error(ErrorCode::kInvalidInput,
@@ -65,7 +65,7 @@ inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t lea
   const auto grid = empty_vdb_grid<openvdb::FloatGrid>(job, "surface");
   grid->setGridClass(openvdb::GRID_LEVEL_SET);
   grid->setTree(std::make_shared<openvdb::FloatTree>(background));
-  std::vector<float> distances(static_cast<size_t>(limit) + 1);  // by (2 distance)^2
+  std::vector<float> distances(static_cast<size_t>(limit) + 1);  // index: (2 distance in cells)^2
   for (int i = 0; i <= limit; ++i)
     distances[static_cast<size_t>(i)] = static_cast<float>(std::sqrt(i) / 2 * job.cell_edge());
   ExportStage stage(job, "build grid", leaves, "leaves");

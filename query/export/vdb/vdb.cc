@@ -59,7 +59,7 @@ struct VoxelGrid {
   // for the level set, voxels for the other grids.
   openvdb::GridBase::Ptr (*make)(const ExportJob& job, uint64_t steps);
   NanoGrid (*make_nano)(const ExportJob& job, uint64_t steps);
-  // The values are distances from the surface. The file then has no color grid.
+  // True if the values are distances from the surface. The file then has no color grid.
   bool is_level_set = false;
 
   bool has_colors(const ExportJob& job) const { return job.has_colors && !is_level_set; }
@@ -314,7 +314,7 @@ ExportReport write_vdb(const ExportJob& job) {
     }
     return write_grid_file(job, voxels, std::max<uint64_t>(min_bytes, 1),
                            [&](std::ostream& stream) {
-                             // Uses no codec, because some readers may lack that codec.
+                             // Uses no compression codec, because some readers have none.
                              // COMPRESS_ACTIVE_MASK only leaves out inactive values.
                              openvdb::io::Stream out(stream);
                              out.setCompression(openvdb::io::COMPRESS_ACTIVE_MASK);

@@ -60,8 +60,8 @@ class FileActions {
 
 class Attributes {
  public:
-  // Resets the signals below to their default actions in the started program, which would
-  // otherwise inherit that this process ignores them.
+  // Resets the signals below to their default actions in the started program. Otherwise the program
+  // would ignore those signals that this process ignores.
   Attributes() {
     posix_spawnattr_init(&attributes_);
     sigset_t defaults;

@@ -5,8 +5,8 @@
 //
 // Resume rule: a baked cube is stored in the work folder (color_store.h) under a key of all its
 // inputs (color_keys.h), and a later run with an equal key reuses it. A stopped run loses only
-// unfinished cubes; a changed texture affects only the cubes that show it. An image is decoded only
-// if it is possible that a cube that must be baked shows it.
+// unfinished cubes. After a change of an image, only the cubes that show the image are baked again.
+// An image is decoded only if one of the cubes to bake can show it.
 #pragma once
 
 #include <cstdint>

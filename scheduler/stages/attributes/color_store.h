@@ -53,7 +53,8 @@ class ColorStore {
   Place add(const Checksum128& key, uint64_t number, bool is_last, std::span<const std::byte> part);
   // Removes artifacts with other keys if they take more space than the artifacts with these keys
   // plus 64 KiB. Does not remove them if the disk has no space for a copy of the file. Call it
-  // before add(). An interruption leaves the old or the new file, both complete.
+  // before add(). After an interruption, either the complete old file or the complete new file
+  // exists.
   void keep_only(std::span<const Checksum128> keys, const CancelToken& cancel);
   const std::string& path() const { return path_; }
   // Bytes of the file.

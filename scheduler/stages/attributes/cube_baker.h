@@ -36,7 +36,7 @@ class CubeBaker {
   // Bakes the regions of the cube that have surfaces, and appends their records in Morton order.
   // `bin` must contain all surfaces that touch the cube, and is cleared. `records` has one element
   // per attribute, in the order of the attributes. Calls take(records) whenever the records of one
-  // attribute have kManyRecordBytes.
+  // attribute take kManyRecordBytes or more.
   void bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take);
 
   static constexpr size_t kManyRecordBytes = 256 << 10;

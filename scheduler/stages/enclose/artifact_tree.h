@@ -34,8 +34,8 @@ class ArtifactTree {
   Place find(const Cube& cube) const;
 
  private:
-  // The root cubes that overlap the parts, and their artifacts. If a root cube is larger than the
-  // part, `cubes` has the cube of the part instead.
+  // The root cubes that overlap the parts, and the artifact of each root cube. If a root cube is
+  // larger than the part, `cubes` has the cube of the part instead.
   struct Roots {
     std::vector<Cube> cubes;
     std::vector<ArtifactRef> artifacts;

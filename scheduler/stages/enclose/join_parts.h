@@ -1,5 +1,5 @@
-// Joins the components of all parts of the grid where they meet, and finds the components that
-// reach the border of the grid.
+// Joins the components of the empty space of all parts of the grid where they meet, and finds the
+// components that reach the border of the grid.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace voxdag {
 struct OutsideSpace {
   std::vector<std::vector<uint8_t>> of_parts;  // for each part and component: 1 if it is outside
   std::vector<Cube> enclosed_cubes;            // the enclosed empty cubes between the parts
-  bool is_seed_outside = false;                // a walk leads from the seed to the border
+  bool is_seed_outside = false;  // the empty space around the seed reaches the border of the grid
 };
 
 // Joins the components where parts and empty cubes meet, and finds the components that are outside.

@@ -33,9 +33,10 @@ constexpr double kMaxBricksPerFlatSubvolume = 128e6;
 // Bytes of memory per expected brick, enough for most flat subvolumes. If a flat subvolume
 // needs more memory than a worker has, the worker splits it.
 constexpr double kBytesPerFlatBrick = 16;
-// The same limits for a GPU, which needs about 3 ms for each subvolume in addition to the time for
-// its bricks. There are at least kMinSubvolumesPerGpuWorker for each worker, or fewer if each would
-// have less than kMinBricksPerGpuSubvolume expected bricks.
+// Limits for subvolumes that a GPU builds. The GPU needs about 3 ms for each subvolume in addition
+// to the time for its bricks. For each worker there are at least kMinSubvolumesPerGpuWorker
+// subvolumes, or fewer if a subvolume would have less than kMinBricksPerGpuSubvolume expected
+// bricks.
 constexpr double kMaxBricksPerGpuSubvolume = 32e6;
 constexpr double kMinBricksPerGpuSubvolume = 1e6;
 constexpr double kMinSubvolumesPerGpuWorker = 4;
@@ -71,9 +72,9 @@ int planned_gpus(const BuildSpec& spec, double total_weight) {
   return gpus_to_use(spec.run, spec.geometry.rule(), total_weight);
 }
 
-// Returns the maximum weight of flat subvolumes that no GPU builds. With this maximum, there are
-// enough subvolumes for all threads, and the tables of a subvolume fit in half of a worker's share.
-// Returns 0 if flat subvolumes have no separate maximum.
+// Returns the maximum weight of a flat subvolume in a build without GPUs. With this maximum, there
+// are enough subvolumes for all threads, and the tables of a subvolume fit in half of a worker's
+// share. Returns 0 if flat subvolumes have no separate maximum.
 double max_flat_weight(const BuildSpec& spec, double total_weight) {
   const RunOptions& run = spec.run;
   // The tasks of a cluster can have less memory, and `parallel-host` needs more.

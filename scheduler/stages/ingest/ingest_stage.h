@@ -1,4 +1,4 @@
-// The ingest stage: from the scene to its triangles in a store, and a plan of the subvolumes.
+// The ingest stage: stores the scene's snapped triangles, and plans the subvolumes.
 #pragma once
 
 #include <cstdint>

@@ -25,9 +25,10 @@ class TooManyReaders : public Error {
   explicit TooManyReaders(const Error& error) : Error(error) {}
 };
 
-// Reads the scene from triangle `position` to its end, piece by piece. make_piece(piece) fills
-// an optional<Piece>, which a reader uses for all pieces that it reads. Each piece is read with
-// Piece::read() and then passed to commit(piece, end), which sets `position` to `end`.
+// Reads the scene from triangle `position` to its end, piece by piece. Each reader has one Piece
+// object and reads all its pieces with Piece::read() into this object. make_piece(piece) makes the
+// object in an optional<Piece>. After each read, commit(piece, end) processes the piece and must
+// set `position` to `end`, the index after the last triangle of the piece.
 template <class Piece, class MakePiece, class Commit>
 void read_pieces(TriangleSource& scene, const uint64_t& position, const StageContext& context,
                  MakePiece make_piece, Commit commit) {

@@ -28,8 +28,8 @@ struct DamagedSubvolume {
 void read_above(uint32_t level, std::shared_ptr<ReadableFile> segment,
                 const StoredSubvolume& subvolume, bool reads_frames) {
   const ArtifactReader reader(std::move(segment), subvolume.artifact);
-  // A cluster task may have split the subvolume and merged its parts with other subvolumes. Then
-  // the artifact has a root for each part and each other subvolume.
+  // If a cluster task has split the subvolume, it has merged the parts with the other subvolumes of
+  // its batch. Then the artifact has a root for each part and each other subvolume.
   if (std::ranges::none_of(reader.roots(), [&](const ArtifactRoot& root) {
         return contains(subvolume.cube, root.cube);
       }))

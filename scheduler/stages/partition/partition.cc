@@ -105,7 +105,7 @@ class TouchedPiece {
 
 using BinsByCube = std::map<Cube, CubeBin>;
 
-// Returns the bin of the cube or of the smallest cube around it that has a bin.
+// Returns the bin of the smallest cube that has a bin and is `wanted` or contains it.
 const CubeBin& nearest(const BinsByCube& bins, const Cube& wanted) {
   for (Cube cube = wanted;; cube = cube.parent()) {
     const auto found = bins.find(cube);

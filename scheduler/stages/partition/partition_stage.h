@@ -1,4 +1,4 @@
-// The partition stage: from the scene's triangles to a bin for each subvolume.
+// The partition stage: copies the scene's triangles to one bin for each subvolume.
 //
 // Resume rule: with a durable store the partition continues at the last checkpoint.
 #pragma once

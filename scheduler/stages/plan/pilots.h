@@ -26,9 +26,9 @@ struct PilotCounts {
   RowCounts rows;
 };
 
-// Runs pilots at two consecutive resolutions, the finest whose triangles and tables fit the budget.
-// Returns the coarser pilot first. Returns fewer than two pilots if too many resolutions do not
-// fit. The pilots run on this thread.
+// Runs pilots at the two finest resolutions at which the triangles and the tables fit the budget.
+// Returns the coarser pilot first. Returns one pilot or none if they fit at fewer than two of the
+// tried resolutions. The pilots run on this thread.
 std::vector<PilotCounts> build_pilots(const GeometryOptions& options, const PreparedScene& scene,
                                       BuildScene& source, const StageContext& context);
 

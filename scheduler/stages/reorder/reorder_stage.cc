@@ -7,7 +7,8 @@
 namespace voxdag {
 namespace {
 
-// The merge may have retained scratch files with smaller numbers.
+// Id of the stage's first scratch file. The same folder can still have scratch files of the merge.
+// Their ids are smaller.
 constexpr uint32_t kFirstScratchId = uint32_t{1} << 30;
 
 }  // namespace

@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint64_t kBytesOfTile = sizeof(OutsideTile) + 96;  // a tile and its node in the map
 
-// The triangles of a piece of the scene that extend beyond the grid and that the grid's sample rows
-// can cross.
+// Collects the triangles of one piece of the scene that extend beyond the grid, if a sample row of
+// the grid can cross them.
 class LeavingPiece {
  public:
   explicit LeavingPiece(const Grid& grid)

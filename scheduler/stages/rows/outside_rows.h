@@ -1,6 +1,7 @@
 // The crossings of sample rows with triangles outside the grid. A sample row
-// (core/geometry/solid_rule.h) is a line that continues beyond the grid. Only a grid that is given
-// by --bounds can have triangles outside. No subvolume has these crossings. Not thread-safe.
+// (core/geometry/solid_rule.h) is a line that continues beyond the grid. Triangles can be outside
+// the grid only if --bounds gives the grid. The row sums of the subvolumes (RowSums) do not count
+// crossings outside the grid. Not thread-safe.
 #pragma once
 
 #include <array>

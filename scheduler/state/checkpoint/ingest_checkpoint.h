@@ -5,10 +5,10 @@
 //
 // Invariants:
 //   1. The row refers only to bytes of the file that were synced before the row was written.
-//   2. A row is valid only if the request is the same, and if every file that decides the voxels
-//      (the scene's files, and the images of cutouts that are left out) has the same inode, size
-//      and times. When the scene was opened, the times must have been so old that any later change
-//      of a file gives it different times.
+//   2. A row is valid only if the request (the geometry options and the paths of the scene) is the
+//      same, and if every file that decides the voxels (the scene's files, and the images of
+//      cutouts that are left out) has the same inode, size and times. When the scene was opened,
+//      the times must have been so old that any later change of a file gives it different times.
 //   3. An invalid or damaged row is removed, and the scene is read again.
 // Used by one thread.
 #pragma once

@@ -8,9 +8,9 @@
 namespace voxdag {
 namespace {
 
-// Returns the access of a build to its job store. Other processes read the store of a cluster
-// build, and a kept store must exist in the end. The store of any other build can remain in memory
-// until the build has work to record.
+// Returns the access of a build to its job store. The store of a cluster build must be a file,
+// because other processes read it. With keep_work, a file must exist at the end of the build. The
+// store of any other build can remain in memory until the build has work to record.
 JobStore::Access access_of(const RunOptions& run) {
   return run.cluster || run.keep_work ? JobStore::Access::kBuild : JobStore::Access::kBuildLater;
 }
