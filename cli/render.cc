@@ -31,7 +31,7 @@ struct RenderCommand {
   OutputFile output;
   std::string depth;  // "": no depth map
   std::string view = "auto";
-  std::string camera, target;  // as typed
+  std::string camera, target;  // texts of the options
   std::optional<double> fov_degrees;
   std::string background = "sky", shade = "color";
   std::string size = "1280x720", memory;

@@ -8,7 +8,7 @@ namespace voxdag::cli {
 
 struct RunTimes {
   double wall_s = 0;
-  double cpu_s = 0;  // of all threads of the process
+  double cpu_s = 0;  // CPU time of all threads of the process
 };
 
 // Measures the wall time and CPU time since its construction.

@@ -19,7 +19,7 @@ struct DownloadCommand {
   ServiceOptions service;
   std::string id;
   OutputFile output;
-  server::ExportSpec spec;  // without a format: the result of the job
+  server::ExportSpec spec;  // if it has no format, downloads the job's result
   bool quiet = false;
   bool json = false;
 };

@@ -154,7 +154,7 @@ class Source {
 
   StoredSection stored_;
   const DagView dag_;
-  const uint32_t grid_levels_;  // of the result
+  const uint32_t grid_levels_;  // levels of the result's grid
   const Position offset_;
 };
 
@@ -423,7 +423,8 @@ class CombinedColors {
   const DagView dag_;
   const std::optional<voxdag_reader::Rgb> fill_;
   const CancelToken& cancel_;
-  std::vector<std::unique_ptr<Source>> sources_;  // the first one with a value wins
+  // A finest cell gets its value from the first source that has a value for it.
+  std::vector<std::unique_ptr<Source>> sources_;
   std::unique_ptr<const ResidentPages> pages_;
   uint32_t levels_ = 0;
   std::vector<std::string> names_;

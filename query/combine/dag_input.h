@@ -75,7 +75,7 @@ class DagInput {
   const uint64_t memory_bytes_;
   const CancelToken& cancel_;
   const CheckedBlocks blocks_;
-  uint64_t touched_bytes_ = 0;  // since the last check of the memory
+  uint64_t touched_bytes_ = 0;  // bytes read since the last check of the memory
 };
 
 // Returns the offsets of a node's children by their index; kNoNode if a child does not exist.

@@ -36,7 +36,7 @@ struct JoinedLevel {
   // Hashes of all nodes of the level, in the order of the file.
   SpillList<uint64_t> hashes_a;
   SpillList<uint64_t> hashes_b;
-  SpillList<NodePair> equal;  // both offsets increase
+  SpillList<NodePair> equal;  // in increasing order of both offsets
   NodePair full;              // the nodes in which all voxels are set, if any
 };
 

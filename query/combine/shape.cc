@@ -11,7 +11,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMixed = 0;          // any value except kNoNode and Shape::kFull
-constexpr int kIndexBits = 20;          // kMaxGridLevels
+constexpr int kIndexBits = 20;          // bits of a position on one axis: kMaxGridLevels
 constexpr double kMaxLength = 1 << 24;  // so that sums of squares have less than 64 bits
 
 [[noreturn]] void refuse_shape(const std::string& text) {

@@ -92,7 +92,7 @@ class DagView {
   }
 
   struct Cell {
-    uint32_t depth = 0;  // below the root
+    uint32_t depth = 0;  // number of levels below the root
     double edge = 0;     // resolution() / 2^depth voxels
     Vec low;             // low corner, in voxels
   };

@@ -48,7 +48,7 @@ inline constexpr int kMaxExportBand = 16;
 // All formats have the option `up`; only some formats have the other options.
 struct ExportOptions {
   UpAxis up = UpAxis::kOfFormat;
-  GridKind grid = GridKind::kOfFormat;  // vdb, nvdb
+  GridKind grid = GridKind::kOfFormat;  // only for vdb and nvdb
   std::optional<int> band;  // with GridKind::kSdf: half width of the band, in voxels; default 3
   bool compact = false;     // npz: leave out arrays that can be computed from the others
   bool outside = false;     // glb: only faces that are visible from outside
@@ -89,7 +89,7 @@ struct ExportFormat {
   const char* suffix;
   const char* second_suffix;
   ExportReport (*write)(const ExportJob& job);
-  UpAxis up = UpAxis::kY;    // the axis that kOfFormat means
+  UpAxis up = UpAxis::kY;  // the axis that kOfFormat means
   // Names of the other options (ExportOptions) of the format, each after a space: " grid band".
   const char* options = "";
 };

@@ -147,7 +147,7 @@ class CellLimit {
  private:
   const ExportJob& job_;
   const uint64_t limit_;
-  std::optional<LevelCells> cells_;  // if the complete grid is selected and memory suffices
+  std::optional<LevelCells> cells_;  // set if the complete grid is selected and memory suffices
 };
 
 // Returns the number of set cells of the job's selection. If this number is over `limit`, throws

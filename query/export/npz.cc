@@ -91,9 +91,9 @@ std::vector<std::byte> central_directory(std::span<const NpzMember> members, uin
     sink.put<uint32_t>(0x02014b50);
     sink.put(kZip64Version);  // version that created it
     put_member_fields(sink, member, 28);
-    sink.put<uint16_t>(0);  // comment
-    sink.put<uint16_t>(0);  // disk
-    sink.put<uint16_t>(0);  // attributes
+    sink.put<uint16_t>(0);  // length of the comment
+    sink.put<uint16_t>(0);  // number of the disk
+    sink.put<uint16_t>(0);  // internal attributes
     sink.put<uint32_t>(0);
     sink.put(~uint32_t{0});  // the offset is in the ZIP64 field
     sink.put_bytes(std::as_bytes(std::span(member.name)));

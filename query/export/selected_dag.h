@@ -38,7 +38,7 @@ class SelectedDag {
   // Upper bounds of the DAG's size on a coarser grid. The bricks of such a grid are made from the
   // nodes two levels above the grid's cells.
   struct Size {
-    uint64_t words = 0, nodes = 0, bricks = 0;  // nodes without the bricks
+    uint64_t words = 0, nodes = 0, bricks = 0;  // `nodes` does not count bricks
   };
   Size size_at(uint32_t grid_levels) const;
 

@@ -38,7 +38,7 @@ namespace {
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;
-constexpr unsigned kMaxWorkers = 256;  // each has an open file
+constexpr unsigned kMaxWorkers = 256;  // each worker has an open file
 // Estimated memory per node while the DAG of a cube is built. The initial number of cubes is
 // computed from this estimate.
 constexpr uint64_t kBytesPerNode = 128;

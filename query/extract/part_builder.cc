@@ -8,11 +8,11 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kNodesBetweenChecks = 4096;  // checks of the cancel token
+constexpr uint64_t kNodesBetweenChecks = 4096;  // between two checks of the cancel token
 // For n nodes of a level, memory for kExpectedChildren * n nodes is reserved in the next finer
 // level. Nodes of surfaces have four children on average, but often share them.
 constexpr uint64_t kExpectedChildren = 2;
-constexpr uint64_t kPrefetchAhead = 8;  // nodes
+constexpr uint64_t kPrefetchAhead = 8;  // distance of prefetches, in nodes
 
 // Returns the occupied octants of a brick: bit c is set if byte c of the brick's `mask` is not 0.
 uint8_t coarser_cells(uint64_t mask) {

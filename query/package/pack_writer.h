@@ -40,7 +40,7 @@ class PackWriter {
   const uint64_t pack_bytes_;
   PackageIndex index_;
   std::unique_ptr<WritableFile> out_;  // file of the current pack
-  Checksum64 checksum_;                // of the current pack
+  Checksum64 checksum_;                // checksum of the current pack
   PackageFile pack_;                   // the current pack
   uint64_t bytes_ = 0;
   DirectoryPage page_;             // current page of the directory

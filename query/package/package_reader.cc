@@ -20,7 +20,7 @@ namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
-constexpr size_t kMaxBlockBytes = size_t{1} << 20;  // not compressed
+constexpr size_t kMaxBlockBytes = size_t{1} << 20;  // size of a decompressed block
 constexpr size_t kDirectoryEntryBytes = 2, kCodeBytes = 8;
 constexpr size_t kHashDigits = 16;
 

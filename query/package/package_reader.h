@@ -66,7 +66,7 @@ class PackageReader {
   const std::string folder_;
   PackageIndex index_;
   uint32_t grid_levels_ = 0;
-  std::vector<Place> places_;  // by block
+  std::vector<Place> places_;  // by the number of the block
 };
 
 }  // namespace voxdag::query

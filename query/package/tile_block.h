@@ -46,7 +46,7 @@ class TileBlockEncoder {
 // The tiles of a block.
 struct TileBlock {
   uint32_t first = 0;  // smallest tile number to which no leaf before the block refers
-  uint32_t next = 0;   // the same after the block
+  uint32_t next = 0;   // the same for the leaves up to the end of the block
   std::vector<std::vector<uint32_t>> tiles;
 };
 

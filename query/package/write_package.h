@@ -27,7 +27,7 @@ struct ViewerFile {
 };
 
 struct PackageSpec {
-  std::string output;  // the folder
+  std::string output;  // path of the package's folder
   // The manifest for viewers (docs/api.md), as JSON. write_package() adds the digest. The member
   // "tile_levels" must be kPackageTileLevels.
   std::string manifest;

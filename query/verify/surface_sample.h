@@ -26,7 +26,8 @@ inline constexpr size_t kSampleBoxes = 256;
 struct SampleBox {
   int64_t low[3];  // in voxels
   int64_t edge;
-  std::bitset<kBoxEdge * kBoxEdge * kBoxEdge> set;  // bit (x * kBoxEdge + y) * kBoxEdge + z
+  // The voxel at low + (x, y, z) is bit (x * kBoxEdge + y) * kBoxEdge + z.
+  std::bitset<kBoxEdge * kBoxEdge * kBoxEdge> set;
 };
 
 // Computes a sample. Returns at most kSampleBoxes boxes, and none if no triangle touches the grid.

@@ -32,7 +32,7 @@ CompletionRecord run_batch(const BatchRun& run, const BuildContext& context);
 struct Allocation {
   unsigned cpus = 0;
   uint64_t memory_bytes = 0;
-  std::string task;  // JOB_INDEX
+  std::string task;  // the task's name in Slurm, JOB_INDEX
 };
 Allocation slurm_allocation();
 

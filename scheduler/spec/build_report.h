@@ -42,7 +42,7 @@ struct BuildReport {
   uint64_t triangles = 0;  // triangles whose bounding boxes touch the grid
   uint64_t dropped_outside = 0;
   uint64_t dropped_invalid = 0;
-  uint64_t subvolumes = 0;  // all, including empty and reused ones
+  uint64_t subvolumes = 0;  // all subvolumes, including empty and reused ones
   uint64_t subvolumes_split = 0;
   uint64_t subvolumes_reused = 0;  // taken from an earlier run of this job, or from the cache
   uint64_t subvolumes_cached = 0;  // reused subvolumes that came from the cache

@@ -7,7 +7,7 @@ namespace {
 
 // Time to build subvolumes, per unit of their weight. Measured for scans, on an H100 and its host.
 // CPU and GPU both build scenes of large flat triangles several times as fast (docs/gpu.md).
-constexpr double kCpuSecondsPerBrick = 60e-9;  // of one thread
+constexpr double kCpuSecondsPerBrick = 60e-9;  // for one thread
 constexpr double kGpuSecondsPerBrick = 5e-9;
 // Time to start CUDA and to check the GPU.
 constexpr double kGpuStartSeconds = 0.3;

@@ -59,7 +59,7 @@ struct GlbLayout {
   Corner low{}, high{};
   bool has_short_positions = false, has_short_indices;
   uint64_t position_bytes = 0, index_bytes = 0, color_offset = 0;
-  uint64_t bytes = 0;  // of the complete binary chunk
+  uint64_t bytes = 0;  // size of the complete binary chunk
 };
 
 template <class Numbers>

@@ -76,7 +76,8 @@ class Surface {
 
   const ExportJob& job_;
   const uint64_t max_rectangles_;
-  const bool clips_faces_;  // the bricks also have cells outside the region
+  // True if the bricks also have cells outside the region. Their faces are left out.
+  const bool clips_faces_;
   voxdag_reader::ColorCursor colors_;
   uint64_t voxels_ = 0;
   uint64_t listed_bricks_ = 0;  // number of bricks that are sorted for each axis

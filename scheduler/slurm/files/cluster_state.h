@@ -47,7 +47,7 @@ struct OpenBatch {
   uint32_t number = 0;
   std::vector<ExpectedSubvolume> subvolumes;
   double weight = 0;
-  std::optional<SlurmTask> task;  // as last seen; none before submission
+  std::optional<SlurmTask> task;  // as Slurm last listed it; none before submission
   std::vector<AttemptEnd> failures;
   std::optional<AttemptError> error;  // not stored in cluster.json
 };

@@ -28,8 +28,8 @@ constexpr double kArtifactOverFile = 1.02;
 constexpr double kExpectedSurfaceBytes = 65;
 // Number of records per surface: one in the bin of each cube that the surface touches.
 constexpr EstimateRange kSurfaceCopies = {1, 1.5, 3};
-constexpr double kSecondsPerCell = 1.2e-7;  // CPU time for the first attribute
-constexpr double kSecondsPerValue = 2e-8;   // per cell, for each attribute after the first
+constexpr double kSecondsPerCell = 1.2e-7;  // CPU time per cell for the first attribute
+constexpr double kSecondsPerValue = 2e-8;   // CPU time per cell for each further attribute
 // CPU time to decode, filter and store a page (kPageBytes) of an image pyramid.
 constexpr double kSecondsPerPage = 3e-5;
 

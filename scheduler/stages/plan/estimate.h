@@ -41,7 +41,7 @@ struct Estimate {
   uint64_t pilot_resolution = 0;
   EstimateRange voxels, svo_nodes, dag_nodes;
   EstimateRange file_bytes;    // size of the global file
-  EstimateRange disk_bytes;    // peak, including spilled triangles, artifacts and the file
+  EstimateRange disk_bytes;    // peak use, including spilled triangles, artifacts and the file
   EstimateRange memory_bytes;  // peak resident memory within the budget
   EstimateRange cpu_s;
   EstimateRange wall_s;

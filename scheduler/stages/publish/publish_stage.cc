@@ -58,7 +58,7 @@ void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes
   const std::string report_file = report_path(job.spec.run);
   if (report_file.empty())
     job.store
-        ->move_to_disk();  // a later run recognizes the output only by the recorded digest
+        ->move_to_disk();  // a later run recognizes the output only by the digest recorded here
   else
     write_partial_file(files, report_file, report_text());
   rename_results(files, out, report_file);
