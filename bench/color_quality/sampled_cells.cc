@@ -31,7 +31,7 @@ uint64_t count_colored(const voxdag_reader::File& file) {
 // octant of a brick or a voxel.
 template <class Visit>
 struct CellVisitor {
-  uint32_t level;  // of the cells
+  uint32_t level;  // level of the cells
   uint32_t shift;  // log2 of a cell's edge in voxels
   Visit visit;
 

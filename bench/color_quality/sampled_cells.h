@@ -19,7 +19,7 @@ class SampledCells {
   // with the same cells have the same sample. The file must have colors.
   SampledCells(const voxdag_reader::File& file, uint64_t wanted);
 
-  // In Morton order.
+  // Returns the positions of the sampled cells, in Morton order.
   const std::vector<CellPosition>& positions() const { return positions_; }
   // Number of colored cells on the file's finest color level.
   uint64_t file_cells() const { return file_cells_; }

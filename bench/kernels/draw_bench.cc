@@ -83,7 +83,7 @@ BENCHMARK_CAPTURE(draw, portable, &portable_kernels())
     ->Args({32, 32})
     ->Args({512, 512})
     ->Args({64, 1});
-// Items are triangles.
+// The items of these benchmarks are triangles.
 BENCHMARK_CAPTURE(test_octants, avx2, avx2_kernels());
 BENCHMARK_CAPTURE(test_octants, portable, &portable_kernels());
 

@@ -10,7 +10,7 @@
 #define VOXDAG_HD
 #endif
 
-// VOXDAG_SSE2 is defined where code can use SSE2, which is on every x86-64 CPU, but not in device
+// VOXDAG_SSE2 is defined in code for x86-64 CPUs, which all have SSE2. It is not defined in device
 // code.
 #if defined(__SSE2__) && !defined(__CUDA_ARCH__)
 #define VOXDAG_SSE2

@@ -17,12 +17,13 @@
 
 namespace voxdag {
 
-// Returns zero-filled pages, or 64-byte aligned memory for a small array, for `bytes` bytes. Throws
-// Error{kOutOfMemory} if the system refuses. The message contains `what`, the purpose of the pages.
+// Returns `bytes` bytes of zero-filled memory: pages or, for a small array, memory that is aligned
+// to 64 bytes. Throws Error{kOutOfMemory} if the system refuses. The message contains `what`, the
+// purpose of the pages.
 void* allocate_pages(size_t bytes, std::string_view what);
-// Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which may have
-// changed. The new pages are zero-filled. The old pages can get new addresses, but their bytes are
-// not copied (except in builds with ThreadSanitizer). Throws like allocate_pages().
+// Grows an allocation from `bytes` to `new_bytes` bytes and returns its address, which can be a new
+// one. The new pages are zero-filled. The old pages can get new addresses, but their bytes are not
+// copied (except in builds with ThreadSanitizer). Throws like allocate_pages().
 void* grow_pages(void* pages, size_t bytes, size_t new_bytes, std::string_view what);
 void free_pages(void* pages, size_t bytes);
 // Throws Error{kOutOfMemory}: the memory budget has no `bytes` bytes for `what`.

@@ -11,7 +11,7 @@ namespace voxdag {
 
 struct Warning {
   std::string code;     // the kind, such as "ignored-extension"
-  std::string place;    // the first place: the scene file, and the element of the file; may be ""
+  std::string place;    // the first place: the scene file, and the element of the file; can be ""
   std::string message;  // one sentence about this place
   uint64_t count = 1;   // number of places
 

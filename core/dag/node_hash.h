@@ -43,8 +43,8 @@ VOXDAG_HD inline uint64_t hash_node(uint32_t child_mask, const uint64_t* child_h
   return hash_node(child_mask, popcount64(child_mask), child_hashes);
 }
 
-// Implements --hash-bits: keeps the top `bits` (4 to 64) of the hash and sets the others to 0.
-// Parents are hashed from the truncated hashes of their children.
+// Implements --hash-bits: keeps the top `bits` bits (4 to 64) of the hash and sets all lower bits
+// to 0. Parents are hashed from the truncated hashes of their children.
 VOXDAG_HD inline uint64_t truncate_hash(uint64_t hash, uint32_t bits) {
   return bits >= 64 ? hash : hash & ~(~uint64_t{0} >> bits);
 }

@@ -1,7 +1,7 @@
 // The encoder of color blocks (block_codec.h), in code that compilers vectorize. Each file that
 // includes it is compiled for one instruction set. The file passes a local type as `Set`, so that
 // the linker does not merge the functions of different instruction sets. For the same reason,
-// nothing here calls inline functions that other files may also contain. The arithmetic uses
+// nothing here calls inline functions that other files can also contain. The arithmetic uses
 // integers, or doubles whose results are exact, so every instruction set gives the same bytes.
 #pragma once
 

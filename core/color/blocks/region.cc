@@ -7,7 +7,7 @@
 namespace voxdag {
 
 // Adds cells of the level that is `up` levels above the region's finest level. The code of a cell
-// is `first_code` + cell.code. The cells of a level may come in several calls, in Morton order.
+// is `first_code` + cell.code. Several calls can add the cells of a level, in Morton order.
 template <class ColorOf>
 void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,
                               const ColorOf& color) {

@@ -20,7 +20,8 @@ constexpr double kVoxelMargin = 0x1p-6;
 // A polygon that spans more than this many repetitions of the image is treated as covering all
 // texels.
 constexpr double kMaxPeriods = 16;
-// Texels at the border of a clamped image extend without end. This coordinate stands for the end.
+// The texels at the border of a clamped image extend to infinity. This coordinate stands for
+// infinity.
 constexpr double kEndless = 0x1p45;
 
 std::array<int64_t, 3> low_corner(const Cube& cube, uint32_t grid_levels) {

@@ -4,8 +4,9 @@
 // materials and the images. It does not depend on the order of the triangles, or on the region in
 // which the cell is baked.
 //
-// `Textures` is a reader of images. An image is a pyramid of box-filtered levels, linear and with
-// 16 bits per channel. The first level is the image itself. The members of `Textures` are
+// `Textures` is a reader of images. An image is a pyramid of box-filtered levels. Its intensities
+// are linear, with 16 bits per channel. The first level is the image itself. The members of
+// `Textures` are
 //     uint32_t levels(uint32_t image), width(uint32_t image, uint32_t level), height(...);
 //     View view(uint32_t image, uint32_t level);
 // A View refers to a level. Its members are

@@ -197,8 +197,8 @@ class NeighborFilter {
   // sets p if any voxel in p + [0, V]^3 is set, where V is the radius. Blocked positions are
   // exactly these p. For enclosed voxels, the set voxels of the tile are the open positions. A
   // voxel x is enclosed if no position in x - [0, V]^3 is open. These positions are p + [0, V]^3
-  // with p = x - V. So the result for voxel x is at x - V in the tile, and the result begins at
-  // `low`.
+  // with p = x - V. So the result for voxel x is at x - V in the tile. The cube of results begins
+  // at the tile's coordinate `low`, along each axis.
   NodeRef filter_tile(int depth, const Neighborhood& cubes) {
     const int edge = 1 << base_log2_;
     const bool is_blocked = filter_ == WalkFilter::kBlocked;

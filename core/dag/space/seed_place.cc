@@ -12,8 +12,8 @@ SeedPlace find_seed(const SpaceLabels& labels, const CubeVoxel& voxel) {
   int depth = 0;
   for (; depth < bricks && levels.has_child(depth, rows.back(), octant(depth)); ++depth)
     rows.push_back(levels.child(depth, rows.back(), octant(depth)));
-  // Number of the component, in the octant of rows[depth] that contains the voxel. An empty octant
-  // has one component.
+  // Number of the voxel's component in the octant around the voxel. This is an octant of the node
+  // rows[depth]. An empty octant has one component.
   uint32_t component = 0;
   if (depth == bricks) {
     const uint64_t bit = uint64_t{1} << bit_in_brick(voxel);

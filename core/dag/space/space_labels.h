@@ -52,7 +52,7 @@ class SpaceLabels {
     const uint16_t* const map = d.maps.data() + d.first_map[row];
     return map + map[octant];
   }
-  // Returns the voxels of the components of a brick.
+  // Returns, for each component of a brick, the mask of its voxels.
   const uint64_t* brick_components(uint32_t row) const {
     return brick_masks_.data() + at(levels_.brick_depth()).rows[row].first;
   }
@@ -66,7 +66,7 @@ class SpaceLabels {
     static constexpr uint8_t kFew = 2, kMany = 255;
 
     uint32_t first = 0;  // index in Depth::touch
-    uint8_t count = 0;   // kMany: use the next row's `first`
+    uint8_t count = 0;   // kMany: the next row's `first` minus this row's is the count
     uint8_t open = 0;    // faces at which all voxels are empty
     uint8_t touch[kFew] = {};
   };

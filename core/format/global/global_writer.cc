@@ -83,7 +83,7 @@ struct GlobalFileWriter::State {
   bool retained = false;                         // the partial file outlives the writer
   std::optional<TemporaryPath> registered = {};  // registers the partial file for removal, until it
                                                  // is retained
-  uint64_t end = kPageBytes;  // start of the open or next level or section, or of the checksums
+  uint64_t end = kPageBytes;  // offset of the open or next level or section, or of the checksums
 
   uint32_t brick_level() const { return grid.levels - kBrickLevels; }
   // Returns the open level, or the next level to open.

@@ -17,7 +17,7 @@ namespace voxdag {
 struct NodeLevel {
   voxdag_reader::Level nodes;
   uint32_t hash_bits = 64;
-  bool is_wide = false;  // the width of the child pointers
+  bool is_wide = false;  // true if child pointers have two words
   NodeIndex::Lookup below;
   SubtreeWords children;
 };
@@ -27,8 +27,9 @@ struct NodeBatch {
 
   uint32_t count = 0;
   uint64_t at[kNodes];  // word offsets at which the nodes begin
-  // Results. Where a node has a child pointer that leads to no node, the results end with the node
-  // before it, and `broken_child` is the number of the pointer (from 0).
+  // Results. `subtrees` has results for the first `valid` nodes. `valid` is less than `count` if
+  // the next node has a child pointer that leads to no node. `broken_child` is then the number of
+  // this pointer (from 0).
   uint32_t valid = 0;
   int broken_child = 0;
   Subtree subtrees[kNodes];
@@ -38,8 +39,8 @@ struct NodeBatch {
 // children have a parent. Several threads may use the same level.
 using ComputeBatch = void (*)(const NodeLevel& level, NodeBatch& batch);
 void compute_batch_portable(const NodeLevel& level, NodeBatch& batch);
-// Returns a version that counts bits with an instruction, with the same results. Returns null if
-// this version was not built, or if the CPU does not have the instruction.
+// Returns a version that counts bits with the instruction POPCNT, and has the same results. Returns
+// null if this version was not built, or if the CPU does not have the instruction.
 ComputeBatch compute_batch_popcnt();
 ComputeBatch compute_batch();  // returns the fastest version
 
@@ -122,7 +123,8 @@ class BatchComputer {
                             svo_nodes + 1};
     }
   }
-  // Sets `bit` in a word that several threads may change in this way. Returns the word without it.
+  // Sets `bit` in a word that several threads may change in this way. Returns the word without this
+  // bit.
   template <class Word>
   VOXDAG_INLINE static Word remove_parent_bit(Word* at, Word bit) {
     const Word word = __atomic_load_n(at, __ATOMIC_RELAXED);

@@ -14,7 +14,7 @@
 //
 // Needs memory for two consecutive levels, charged to the budget: 2 bits per word, and 12 bytes per
 // node, or 24 bytes per node of levels whose cubes have more than 32 voxels per edge. If the nodes
-// are in the order by first parent, needs another 64 MiB per thread. All threads work on the same
+// are in the order by first parent, each thread needs another 64 MiB. All threads work on the same
 // level. The result does not depend on the number of threads.
 #pragma once
 

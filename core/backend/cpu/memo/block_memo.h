@@ -65,7 +65,7 @@ class BlockMemo {
   PooledArray<VoxelBlock> blocks_;
   PooledArray<Node> nodes_;
   uint64_t slots_ = 0;     // a power of two
-  uint64_t inserted_ = 0;  // since the last growth
+  uint64_t inserted_ = 0;  // blocks inserted since the last growth
   int shift_ = 0;
   MemoGate gate_;
 };

@@ -43,8 +43,8 @@ struct Plane {
   int64_t rising() const;
   int64_t falling() const;
 
-  // In these functions, the cube has an edge of 2^size_log2 voxels. The comment on this struct
-  // explains n, k, f, p and c.
+  // In the next four functions, the cube has an edge of 2^size_log2 voxels. The comment on this
+  // struct explains n, k, f, p and c.
   //
   // True if, for every cube that the plane crosses, n.k + f fits in 62 bits at all corners k.
   bool fits(int size_log2) const;

@@ -29,9 +29,9 @@ VOXDAG_SLICES_INLINE bool is_zero(const Half& words) {
   return (words[0] | words[1] | words[2] | words[3]) == 0;
 }
 
-// Exchanges bits within pairs of an upper and a lower lane: the upper lane's bits `low` and the
-// lower lane's bits `low` << `shift` change places. `swapped` is `words` with the lanes of each
-// pair exchanged. `upper` has all ones in the upper lanes.
+// For each pair of an upper and a lower lane, exchanges the bits `low` of the upper lane with the
+// bits `low` << `shift` of the lower lane. `swapped` is `words` with the lanes of each pair
+// exchanged. `upper` has all ones in the upper lanes.
 VOXDAG_SLICES_INLINE void exchange_lanes(Half& words, const Half& swapped, const Half& upper,
                                          int shift, uint64_t low) {
   const Half to_upper = (words & ~low) | ((swapped >> shift) & low);

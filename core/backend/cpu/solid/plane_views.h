@@ -24,9 +24,10 @@ class PlaneViews {
 
   PlaneViews(SolidRule rule, RunningRows& running) : rule_(rule), running_(running) {}
 
-  // Reads the views at the low faces of a tile of 64^3 voxels. `f`: the plane's offset from the
-  // tile. `is_turned`: the triangle's normal is opposite to the plane's. Returns nullopt if views
-  // of one side differ, or if both sides are inside the solid but only one of them is disputed.
+  // Reads the views at the low faces of a tile of 64^3 voxels. `f`: the plane's offset (plane.h)
+  // from the tile. `is_turned`: the triangle's normal is opposite to the plane's. Returns nullopt
+  // if views of one side differ, or if both sides are inside the solid but only one of them is
+  // disputed.
   std::optional<Sides> read(const Plane& plane, int64_t f, bool is_turned, const int (&tile)[3]);
   // Returns the plane's inner sides in a cube within a tile, from the views at the corners of the
   // cube's blocks. The triangle covers the cube and is the only triangle in it. `f`: the plane's

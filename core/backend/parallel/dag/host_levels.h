@@ -16,8 +16,8 @@
 namespace voxdag::parallel {
 
 // The arrays of a HostSpace are on the host already. The arrays of another space are copied to one
-// area of host memory, which is the space's download area or, if they do not fit in it, pages. The
-// download area is valid until the space's device is used for the next build.
+// area of host memory, which is the space's download area or, if they do not fit there, a
+// PageBuffer. The download area is valid until the space's device is used for the next build.
 template <class Space>
 class HostLevels {
  public:
