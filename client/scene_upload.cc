@@ -149,7 +149,7 @@ class Upload {
   uint64_t offset_ = 0;       // bytes that the server has
   bool file_failed_ = false;  // the last error was in the local file, not in the connection
   std::string failure_;       // error of the last attempt
-  double wait_s_ = 0;         // requested by a busy server
+  double wait_s_ = 0;         // pause that a busy server has requested
 };
 
 }  // namespace

@@ -106,7 +106,7 @@ class TriangleReader {
   // Vertex indices of window_count_ triangles, starting at window_first_.
   std::vector<uint32_t> corners_;
   uint64_t window_first_ = 0, window_count_ = 0;
-  UsedVertices used_vertices_;  // vertices used by the window's triangles; empty if not known
+  UsedVertices used_vertices_;  // vertices of the window's triangles; empty until collected
 
   PageBuffer<RealTriangle> batch_;
   size_t batch_size_ = 0;

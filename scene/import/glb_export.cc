@@ -75,7 +75,7 @@ json GlbExport::nodes() {
   for (size_t i = 0; i < order.size(); ++i) {
     json node = node_of(*order[i]);
     for (unsigned c = 0; c < order[i]->mNumChildren; ++c) {
-      if (!order[i]->mChildren[c]) continue;  // a fault of assimp's reader of .raw files
+      if (!order[i]->mChildren[c]) continue;  // caused by a bug in assimp's reader of .raw files
       order.push_back(order[i]->mChildren[c]);
       node["children"].push_back(order.size());
     }

@@ -14,7 +14,7 @@ namespace voxdag::points {
 namespace {
 
 constexpr size_t kLasHeaderBytes = 227;    // LAS 1.1 and 1.2
-constexpr size_t kLas14HeaderBytes = 375;  // with 64-bit counts
+constexpr size_t kLas14HeaderBytes = 375;  // LAS 1.4, which has 64-bit counts
 
 // Size of a record without extra bytes, and offset of its colors, for each point format.
 struct RecordLayout {

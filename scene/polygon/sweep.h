@@ -59,7 +59,7 @@ class Sweep {
   std::span<const Point> corners_;
   double distance_ = 1;  // distance of the movement: 1 inward, -1 outward
   std::vector<uint32_t> order_, rank_;
-  std::vector<LowerEdge> edges_;  // from bottom to top
+  std::vector<LowerEdge> edges_;  // the edges that cross the sweep line, from bottom to top
   Rings rings_;
 };
 

@@ -57,7 +57,7 @@ class VertexCache {
   void load(uint64_t block, size_t slot);
   void read(uint64_t block, std::span<double> out);
 
-  PageBuffer<double> positions_;  // transformed and snapped
+  PageBuffer<double> positions_;  // transformed and snapped positions of the cached blocks
   // The untransformed vertices of the source, if all of them fit here. Then vertices are not read
   // again after place(). is_read_ has a flag per block, which is true once the block was read; it
   // is empty for a source that does not fit.

@@ -28,7 +28,7 @@ class ClockGuard {
 
  private:
   double last_clock_s_;
-  double last_now_s_ = -1;  // time of the last call
+  double last_now_s_ = -1;  // `now_s` of the last call; -1 before the first call
   double uncertain_until_s_ = 0;
 };
 

@@ -39,8 +39,8 @@ class DiskSpace {
 
    private:
     DiskSpace& disk_;
-    uint64_t left_;          // reserved, not yet written
-    uint64_t not_reserved_;  // announced, not yet reserved
+    uint64_t left_;          // bytes that are reserved but not yet written
+    uint64_t not_reserved_;  // bytes that are announced but not yet reserved
   };
 
   // Calls `act`, which deletes or cancels a job or scene. If `act` throws Error{kNoSpace}, removes

@@ -65,7 +65,7 @@ class Exports {
   // For /metrics. The members `ended_*` count since the start of the service.
   struct Statistics {
     std::array<uint64_t, 5> exports{};     // current number of exports, by state
-    std::array<uint64_t, 5> ended_runs{};  // by the state of the export after the run
+    std::array<uint64_t, 5> ended_runs{};  // number of runs, by the export's state after the run
     uint64_t ended_bytes = 0;              // size of the files of the runs that succeeded
     double ended_wall_s = 0;               // wall time of all ended runs
   };
@@ -96,7 +96,7 @@ class Exports {
     Export it;
     // A thread runs this export or removes its files. Only this thread may remove the entry.
     bool is_busy = false;
-    std::shared_ptr<LiveJob> live;  // while its process runs
+    std::shared_ptr<LiveJob> live;  // set while the export's process runs
   };
   using Entries = std::map<std::string, Entry>;  // keyed by id
 

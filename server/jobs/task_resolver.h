@@ -40,7 +40,7 @@ class TaskResolver {
   const ServerConfig& config_;
   SceneStore& scenes_;
   const uint64_t memory_bytes_;
-  std::vector<std::string> roots_;  // resolved, each ending in '/'
+  std::vector<std::string> roots_;  // resolved paths of the scene roots, each ending in '/'
 };
 
 }  // namespace voxdag::server

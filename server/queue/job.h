@@ -49,7 +49,7 @@ std::optional<JobState> parse_state(std::string_view name);
 inline bool has_ended(JobState state) { return state >= JobState::kCanceled; }
 
 struct JobError {
-  std::string code;  // docs/errors.md, or "internal"
+  std::string code;  // a code of docs/errors.md, or "internal"
   std::string message;
   double at_s = 0;  // Unix time in seconds, like all times of a job; 0: never
   bool transient = false;
@@ -84,7 +84,7 @@ struct JobEvent {
   double at_s = 0;
   JobState state = JobState::kQueued;
   unsigned attempt = 0;
-  std::string error;  // code; "" for none
+  std::string error;  // error code; "" for none
 };
 
 }  // namespace voxdag::server

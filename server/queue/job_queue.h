@@ -26,7 +26,7 @@ namespace voxdag::server {
 
 struct JobFilter {
   std::vector<JobState> states;  // empty: all states
-  int64_t before = INT64_MAX;    // only smaller job numbers
+  int64_t before = INT64_MAX;    // only jobs with smaller numbers
   size_t limit = 50;
   // Only jobs whose name, scenes or labels contain this text, or whose id begins with it. Case does
   // not matter for ASCII letters. "": all jobs.

@@ -58,7 +58,7 @@ class SceneUpload {
   std::unique_ptr<WritableFile> file_;
   std::string buffer_;
   uint64_t offset_;
-  uint64_t recorded_;  // recorded offset in the store
+  uint64_t recorded_;  // offset that the store has recorded
   Sha256 digest_;      // digest of this part
   std::string sha256_;
   bool done_ = false;

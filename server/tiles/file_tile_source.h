@@ -59,7 +59,7 @@ class FileTileSource : public TileSource {
   mutable std::atomic<bool> has_damage_{false};
   mutable std::mutex manifest_mutex_;  // guards manifest_ while it is being computed
   mutable std::string manifest_;
-  mutable std::atomic<bool> has_manifest_{false};  // manifest_ is final
+  mutable std::atomic<bool> has_manifest_{false};  // true once manifest_ is final
 };
 
 }  // namespace voxdag::server

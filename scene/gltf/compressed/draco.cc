@@ -36,7 +36,7 @@ namespace {
 constexpr uint64_t kBytesPerFace = 128;
 constexpr uint64_t kBytesPerFaceOfTable = 64;
 constexpr uint64_t kMapBytesPerValue = 16;
-constexpr uint64_t kBytesPerAttribute = 1024;  // objects of an attribute and its decoder
+constexpr uint64_t kBytesPerAttribute = 1024;  // for the objects of an attribute and of its decoder
 
 constexpr size_t kWriteElements = 16384;
 

@@ -12,10 +12,10 @@ namespace voxdag::gltf {
 // The JSON text of an element, and counts from which the memory of its values is estimated.
 struct ElementText {
   std::string text;
-  uint64_t values = 0;                // all values, with the element itself
-  uint64_t values_in_extensions = 0;  // values inside of a member "extensions"
-  uint64_t members = 0;               // members of objects
-  uint64_t string_bytes = 0;          // strings and keys of members
+  uint64_t values = 0;                // number of values, including the element itself
+  uint64_t values_in_extensions = 0;  // number of values inside a member "extensions"
+  uint64_t members = 0;               // number of members of objects
+  uint64_t string_bytes = 0;          // bytes of all strings and keys of members
 };
 
 class ElementTextWriter {

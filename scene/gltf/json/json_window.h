@@ -65,7 +65,7 @@ class JsonWindow : public std::streambuf {
   bool in_escape_ = false;        // the last character is part of an escape
   bool after_blank_ = false;      // the last character outside of strings is blank
   bool is_second_blank_ = false;  // the last two characters outside of strings are blank
-  uint64_t word_ = 0;             // characters of the number or literal so far
+  uint64_t word_ = 0;             // number of characters of the current number or literal
   std::string_view replacement_;  // characters that the parser receives next
   // Characters passed to the parser for the current string or number.
   uint64_t collected_ = 0;

@@ -32,7 +32,7 @@ std::shared_ptr<const RestartIndex> find_triangles(Document& document, BufferRea
       uint32_t corners[3];
       if (!walk.add(window[i], corners)) continue;
       if (found->triangles++ % RestartIndex::kTriangles != 0) continue;
-      document.charge.add(2 * sizeof(RestartIndex::Entry));  // twice, because the vector grows
+      document.charge.add(2 * sizeof(RestartIndex::Entry));  // twice: old and new array
       found->entries.push_back({first + i, before});
     }
   }

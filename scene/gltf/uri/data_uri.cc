@@ -49,7 +49,7 @@ std::optional<std::string> decode_data(std::string_view data, bool is_base64) {
   normalize(text);
   if (text.size() % 4 == 1 || text.find('=') != text.npos) return {};
   std::string bytes((text.size() + 3) / 4 * 3, '\0');
-  constexpr size_t kPart = size_t{1} << 20;  // a multiple of four
+  constexpr size_t kPart = size_t{1} << 20;  // characters per step; a multiple of four
   for (size_t at = 0; at < text.size(); at += kPart) {
     const std::string_view part = std::string_view(text).substr(at, kPart);
     if (!voxdag::decode_base64(std::as_bytes(std::span(part)),

@@ -46,7 +46,7 @@ class PolygonReader {
   const ObjFile& obj_;
   LineReader lines_;
   uint64_t next_face_ = 0;
-  uint64_t vertices_before_ = 0, texcoords_before_ = 0;  // number of v and vt statements
+  uint64_t vertices_before_ = 0, texcoords_before_ = 0;  // v and vt statements before the face
   uint32_t material_ = 0;
   std::vector<Corner> corners_;
   std::vector<uint32_t> vertices_;

@@ -81,7 +81,7 @@ class ConnectionTable {
   std::condition_variable released_;  // memory of an answer was released
   std::list<Entry> entries_;
   std::map<std::string, size_t> by_client_;
-  size_t bytes_since_trim_ = 0;  // released since freed memory was returned to the system
+  size_t bytes_since_trim_ = 0;  // bytes released since memory was last returned to the system
 };
 
 // True for addresses of the loopback: 127.0.0.0/8, also as ::ffff:127.x.x.x, and ::1.

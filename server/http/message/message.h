@@ -27,7 +27,7 @@ struct Request {
   std::string id;      // X-Request-Id of the answer, also in the log
   std::string caller;  // name of the caller's token, once it is known
   std::optional<uint64_t> content_length;
-  bool has_body = false;  // a Content-Length above 0, or chunked
+  bool has_body = false;  // true for a Content-Length above 0, or a chunked body
 
   // Passes the body to `sink` in pieces until the body ends or `sink` returns false. Call it at
   // most once. If the body is not read to its end, the connection is closed after the answer.

@@ -58,7 +58,7 @@ struct Export {
   // Unix times in seconds; 0: never.
   double created_s = 0, started_s = 0, finished_s = 0;
   std::string error_code, error_message;  // "" without an error
-  ExportResult result;                    // of an export that succeeded
+  ExportResult result;                    // set if the export has succeeded
 };
 template <class Visitor>
 void fields(Visitor& visit, Export& e) {

@@ -55,8 +55,8 @@ std::vector<std::string> export_spec_formats();
 void check_export_spec(const ExportSpec& spec);
 // Parses and checks the body of the request. Throws RequestError{kInvalid}.
 ExportSpec parse_export_spec(std::string_view body);
-// Returns the options that differ from their defaults as JSON. The text is equal for equal
-// requests, and parse_export_spec() reads it.
+// Returns a JSON text of the options that differ from their defaults. The text is equal for equal
+// requests, and parse_export_spec() can read it.
 std::string export_spec_text(const ExportSpec& spec);
 
 // Returns the selected part of `file`. Throws RequestError{kInvalid} if the grid of the file has

@@ -40,7 +40,7 @@ class CoarseCubes {
  private:
   uint64_t total_ = 0, built_ = 0;
   std::map<SubvolumeId, CoarseCube> cubes_;
-  SubvolumeId next_ = 0;  // subvolume to read first
+  SubvolumeId next_ = 0;  // id at which the next refresh() begins to read
 };
 
 }  // namespace voxdag

@@ -9,7 +9,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kMaxWords = uint64_t{1} << 32;  // per level: child pointers have 32 bits
+constexpr uint64_t kMaxWords = uint64_t{1} << 32;  // per level, because child pointers have 32 bits
 
 bool is_within(const Cube& cube, const Cube& whole) {
   if (cube.level < whole.level) return false;

@@ -256,7 +256,7 @@ export class Viewer {
   flyToText(text) {
     const placement = parseCameraText(this.space, text, this.camera.fovDegrees);
     new Camera(this.manifest.resolution)
-        .set(placement);  // throws if the placement shows no picture
+        .set(placement);  // throws if no picture can be taken from there
     this.flyTo(placement);
   }
 

@@ -9,10 +9,10 @@ const kClickMovePx = 5;
 const kClickTimeMs = 600;
 const kDoubleTimeMs = 350;
 const kDoubleMovePx = 24;
-const kWheelZoom = 0.0016;  // per pixel of the wheel
+const kWheelZoom = 0.0016;  // logarithm of the zoom factor per pixel of the wheel
 const kAnchorTimeMs = 400;  // wheel events within this time zoom to the same point
 const kAnchorSteps = 6;     // maximum picks after the first one, if the cursor is on the sky
-const kLinePx = 20;         // pixels per line of a wheel event
+const kLinePx = 20;         // pixels that one line of a wheel event counts as
 const kRecentMs = 80;       // inertia starts with the mean speed in this last part of a drag
 
 export class Controls {

@@ -5,13 +5,14 @@ import {between} from "./camera.js";
 
 const kFlightS = 0.35;
 const kCoastS = 0.12;    // time constant of inertia: the speed falls to 1/e in this time
-const kMinCoast = 0.02;  // radians per second
+const kMinCoast = 0.02;  // minimum speed of inertia in radians per second
 const kMaxCoast = 3;
 const kTurnRate = 1.2;  // radians per second, while an arrow key is held
-const kZoomRate = 1.6;  // per second, by + and -
+const kZoomRate = 1.6;  // logarithm of the zoom factor per second, while + or - is held
 const kFlyRate = 0.8;   // per second, in multiples of the distance to the visible surface
 const kFast = 4;        // factor of the speed while Shift is held
-// A key press at once moves the camera as far as holding the key for this many seconds.
+// A key press immediately moves the camera as far as holding the key for this number of seconds
+// does.
 const kFirstStepS = 1 / 20;
 
 export class Motion {

@@ -3,7 +3,7 @@
 
 import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 
-const kFar = 2 ** 30;  // in voxels; an eye farther away is moved to this distance
+const kFar = 2 ** 30;  // max magnitude of the eye's coordinates, in voxels
 
 export class View {
   // Positions are in voxels; the vertical field of view is in degrees.

@@ -1,8 +1,8 @@
 // Measures the speed of the GPU. Chooses, from this speed, the number of pixels per part of a
 // sample, and the internal resolution while the camera moves or tiles arrive.
 
-const kTargetMs = 40;  // time of a frame while the camera moves
-const kPartMs = 120;   // time of a part of a sample
+const kTargetMs = 40;  // target time of a frame while the camera moves
+const kPartMs = 120;   // target time of a part of a sample
 const kScales = [1, 3 / 4, 1 / 2, 3 / 8, 1 / 4, 3 / 16, 1 / 8];  // internal / full resolution
 // Limits for lacksFew: missing tiles, and width in pixels of the widest missing cell.
 const kFewTiles = 64, kCoarsePixels = 16;

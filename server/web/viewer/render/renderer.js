@@ -326,7 +326,7 @@ export class Renderer {
   takeReading(sample, now) {
     const {pass, epoch, isMoving, isFull, width, height} = sample, {stream, progress, pace} = this;
     const read = readFeedback(pass.take());
-    read.coarsePixels *= this.size.height / height;  // pixels of the canvas
+    read.coarsePixels *= this.size.height / height;  // converts to pixels of the canvas
     this.measured.noteFrame(read, width * height);
     pace.frameDone(now - sample.partMs, sample.busyMs, width * height, isMoving || !isFull);
     // The light changes only during the first quarter of the samples of a still picture.

@@ -2,7 +2,7 @@
 // (gl/feedback.js).
 
 const kQuietReadings = 2;             // readings without a missing tile that complete the view
-export const kMaxLateCellPixels = 3;  // missing cells up to this width do not restart a picture
+export const kMaxLateCellPixels = 3;  // arriving cells of up to this width do not restart a picture
 
 export class ViewProgress {
   constructor() {

@@ -3,7 +3,7 @@
 // GPU.
 
 export const kTexelWords = 4;
-export const kBlockTexels = 16;  // in the pool; no node or leaf crosses the end of a block
+export const kBlockTexels = 16;  // texels per pool block; no node or leaf crosses a block's end
 const kMagic = 0x31544456;
 const kHeadWords = 4;
 const kCutWords = 4;  // words of a cut-off node in a tile

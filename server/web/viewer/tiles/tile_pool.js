@@ -8,7 +8,7 @@
 import {kBlockTexels, kTexelWords} from "./tile_format.js";
 
 const kRowTexels = 4096, kTableWidth = 1024;  // texture widths, also in the shaders
-const kMaxRows = 4096;                        // addresses have 24 bits
+const kMaxRows = 4096;                        // limited, because addresses of texels have 24 bits
 const kBlocksPerRow = kRowTexels / kBlockTexels;
 const kTexelBytes = kTexelWords * 4;
 const kFirstRows = 256;  // initial size of a growing pool: 16 MiB
@@ -26,7 +26,7 @@ export class TilePool {
     this.maxRows =
         Math.min(grows ? rows - kFirstRows : rows, kMaxRows, gl.getParameter(gl.MAX_TEXTURE_SIZE));
     this.rows = grows ? kFirstRows : this.maxRows;
-    this.blockCount = this.maxRows * kBlocksPerRow;  // number at the final size
+    this.blockCount = this.maxRows * kBlocksPerRow;  // number of blocks at the final size
     this.tableRows = Math.ceil(this.blockCount / kTableWidth);
     this.slotCount = this.tableRows * kTableWidth;
     this.texels = this.createTexture(gl.RGBA32UI, kRowTexels, this.rows);
