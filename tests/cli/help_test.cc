@@ -70,8 +70,8 @@ TEST_F(Help, ReportsThatItCannotBeWritten) {
   EXPECT_NE(answer.err.find("write to the standard output: "), std::string::npos) << answer.err;
 }
 
-// Checks for each field that the help text has its option exactly if the field's scope is at most
-// `scope` (kSubmit, kPlan or kBuild).
+// Checks for each field that the help text has its option if and only if the field's scope is at
+// most `scope` (kSubmit, kPlan or kBuild).
 struct OptionFinder {
   template <class T>
   void operator()(const voxdag::Field& field, T&) {

@@ -94,7 +94,7 @@ TEST_F(MeshFormats, HaveTheSamePlan) {
   }
 }
 
-// A scene of several files may mix formats.
+// The files of one scene can have different formats.
 TEST_F(MeshFormats, AreMixedInOneScene) {
   const Json expected = run_json({"build", "a.ply", "-r", "256", "-o", "one.vdag"});
   const Json report = run_json(

@@ -76,8 +76,8 @@ TEST_P(CrashTest, AFullDiskLosesNothingThatItStored) {
   const BuildReport whole = build(one, counting);
   ASSERT_GT(whole.artifact_bytes, uint64_t{4} << 20) << "fewer than four writes of a segment";
   std::filesystem::remove(output());
-  // The first six operations create, write and sync the names of the work folder, and create the
-  // segment. The seventh writes the segment's first MiB. So operation 10, which fails, writes its
+  // The first six operations make the work folder and create the segment file. The seventh
+  // operation writes the segment's first MiB. So operation 10, which fails, writes the segment's
   // fourth MiB.
   FaultyFiles files({Fault::kNoSpace, 10});
   EXPECT_THROW(build(one, files), voxdag::Error);

@@ -210,8 +210,8 @@ TEST_F(WebhookService, DeliversTheEndOfAJob) {
   EXPECT_EQ(job(post_job({{"scene", "m.glb"}, {"resolution", 16}}))["webhook"], nullptr);
 }
 
-// Answers other than 2xx are repeated, and redirects are not followed. All attempts have the same
-// body. After the last attempt, the delivery has failed.
+// If an answer is not 2xx, the delivery is attempted again. Redirects are not followed. All
+// attempts have the same body. After the last attempt, the delivery has failed.
 TEST_F(WebhookService, RetriesUntilAReceiverAccepts) {
   config_.webhooks.max_attempts = 3;
   start_with_scene();

@@ -109,8 +109,8 @@ TEST_F(Reorder, CommandsThatNeedTheOrderByHash) {
   EXPECT_EQ(pasted["sha256"], run_json({"info", "plain.vdag", "--digest"})["sha256"]);
 }
 
-// A build with --order writes the same file as a build without it that is followed by reorder, also
-// with attributes. A build refuses the work folder of a build with another order.
+// A build with --order writes the same file as a build without --order followed by the command
+// reorder, also with attributes. A build refuses the work folder of a build with another order.
 TEST_F(Reorder, Builds) {
   const Json plain = run_json({"build", "c.glb", "-r", "64", "-o", "x.vdag", "--order",
                                "first-parent", "--memory", "64MiB", "--keep-work"});

@@ -38,7 +38,8 @@ class DyingCheckpoint : public Checkpoint {
     state.reset();
     ++forgotten;
   }
-  // Overwrites the released bytes with zeros if it knows the segment.
+  // If the constructor got the path of a segment, overwrites the released bytes in this segment
+  // with zeros.
   void release(const SegmentRange& range) override {
     if (segment_.empty()) return;
     std::fstream file(segment_, std::ios::in | std::ios::out | std::ios::binary);

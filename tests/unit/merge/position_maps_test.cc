@@ -28,7 +28,8 @@ TEST(Positions, AreOneWordOrTwo) {
   EXPECT_EQ(get_position(words, false), UINT32_MAX);
 }
 
-// Position maps of a wide level keep the high halves of positions, in memory and in a file.
+// Positions in a wide level need 64 bits. Its position maps keep the high halves of positions, in
+// memory and in a file.
 TEST(Positions, OfWideMapsKeepTheirHighHalf) {
   const TemporaryFolder folder;
   MemoryBudget budget(uint64_t{1} << 20);

@@ -213,8 +213,8 @@ TEST(GltfBuffers, WithoutUri) {
   EXPECT_NE(error.message().find("buffer 0 has no uri and is not in the file"), std::string::npos);
 }
 
-// Reads a data: URI that is longer than any window, in pieces that begin at every remainder modulo
-// 3.
+// Reads a data: URI that is longer than the windows in which a file is read. The pieces begin at
+// every remainder modulo 3.
 TEST(GltfBuffers, LongDataUri) {
   constexpr size_t kTriangles = 40000;
   std::vector<float> positions;

@@ -46,7 +46,7 @@ TEST(GltfNodes, ShearedAndMirrored) {
   EXPECT_EQ(corners_of(scene), (std::vector<Point>{{-6, 1, 8}}));
 }
 
-// A matrix is column-major and may be any affine one.
+// The matrix of a node is column-major, and can be any affine transform.
 TEST(GltfNodes, Matrix) {
   SceneBuilder scene = corner_scene();
   scene.add_root({{"mesh", 0}, {"matrix", {1, 0, 0, 0, 2, 1, 0, 0, 0, 0, -1, 0, 7, 8, 9, 1}}});
@@ -220,7 +220,7 @@ TEST(GltfNodes, HiddenNodes) {
   EXPECT_THROW(corners_of(scene), Error);
 }
 
-// Meshes of hidden nodes may be broken, because they are not read.
+// Meshes of hidden nodes can be broken, because they are not read.
 TEST(GltfNodes, HiddenNodesAreNotChecked) {
   SceneBuilder scene = corner_scene();
   scene.add_root({{"mesh", 0}});

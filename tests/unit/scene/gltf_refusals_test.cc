@@ -394,7 +394,7 @@ TEST(GltfUnused, MeshesAndSkinsAreNotChecked) {
 }
 
 // Invalid triangles end the build, or are dropped and counted with --skip-invalid. Vertices that no
-// triangle uses may have any value.
+// triangle uses are not checked, so they can have any value.
 TEST(GltfRefusals, InvalidTriangles) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float inf = std::numeric_limits<float>::infinity();

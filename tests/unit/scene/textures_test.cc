@@ -68,7 +68,7 @@ struct Textures {
 uint64_t channel(uint64_t texel, int c) { return texel >> 16 * c & 0xffff; }
 
 // In an image of odd width and height, every texel of every level is the mean over the texel's
-// area. This holds in memory and in pages of the scratch file.
+// area. This holds if the texels are in memory, and if they are in pages of the scratch file.
 TEST(Textures, PyramidOfOddSizes) {
   const uint32_t width = 67, height = 45;
   const std::string glb = textured(png_of(width, height, noise(4 * width * height))).glb();
@@ -117,7 +117,8 @@ TEST(Textures, DamagedPages) {
   uint64_t texels = 0;
   read_all(sound, [&](uint64_t) { ++texels; });
   EXPECT_GT(texels, width * height);
-  // The first operation makes the file. Each further operation writes a row of tiles.
+  // The first operation makes the file. Each further operation writes a row of tiles (blocks of
+  // texels, one page each).
   const uint64_t operations = sound.files.disk.operations();
   EXPECT_GT(operations, 15u);
   for (uint64_t at = 2; at <= operations; ++at) {

@@ -147,8 +147,9 @@ TEST_F(BuildProtection, SmallBuildsAreRefusedByTheEstimateToo) {
   EXPECT_EQ(plan_build(small, context()).free_disk, 1000u);
 }
 
-// Two folders count as one disk if they have the same device. The estimated disk space of a build
-// is then one sum; otherwise it is compared with each disk.
+// If two folders have the same device, they are on one disk, and the build compares the sum of
+// their estimated disk space with the free space of this disk. Otherwise it compares the estimate
+// of each folder with the free space of its disk.
 TEST_F(BuildProtection, DisksAreToldApartByTheirDevice) {
   BuildSpec large = spec();
   large.geometry.resolution = 4096;

@@ -54,7 +54,8 @@ inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
 }
 
 // Returns the words of the oracle's levels in the layout of the global file, beginning with the
-// bricks. Levels with more than `narrow_words` words are wide.
+// bricks. Pointers to a level of more than `narrow_words` words have 64 bits, other pointers 32
+// bits.
 inline std::vector<std::vector<uint32_t>> level_words(
     const oracle::Dag& dag, uint64_t narrow_words = global_layout::kNarrowLevelWords) {
   std::vector<std::vector<uint32_t>> levels;

@@ -80,7 +80,7 @@ TEST_F(ExportTiles, BricksAndFullCubesAreAllCells) {
         },
         add_cube);
     EXPECT_TRUE(found == expected);
-    EXPECT_EQ(cubes > 0, selection.grid_levels > 3);  // a grid of 8 cells is not full
+    EXPECT_EQ(cubes > 0, selection.grid_levels > 3);  // with 8 cells per edge, no cube is full
   }
 }
 

@@ -47,8 +47,8 @@ std::vector<Region> regions_of(uint32_t grid_levels, uint64_t seed) {
   return regions;
 }
 
-// Compares the functions of DagFile with brute force, for every level of files of three sizes, with
-// narrow and with wide levels.
+// Compares the functions of DagFile with brute force, for every level of files of three sizes. The
+// pointers in the files have 32 bits or 64 bits (wide levels).
 class DagFileTest : public testing::TestWithParam<std::tuple<int, uint64_t>> {
  protected:
   DagFileTest()

@@ -67,8 +67,8 @@ void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& r
   }
 }
 
-// Checks that packets give bit-identical results to RayCaster, which casts single rays, in files of
-// different sizes with narrow and wide levels.
+// Checks that packets give bit-identical results to RayCaster, which casts single rays. The files
+// have different sizes, and pointers of 32 bits or of 64 bits (wide levels).
 void expect_single_rays(WalkPacket walk) {
   uint64_t hits = 0;
   for (const int edge : {4, 8, 64})
@@ -164,7 +164,8 @@ TEST_F(DagRays, RefusesWhatIsNoRay) {
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {1, -1}), ErrorCode::kInvalidInput);
 }
 
-// For more rays than fit in a batch, one thread and four threads find the same hits.
+// Casts so many rays that they are divided into several batches. One thread and four threads find
+// the same hits.
 TEST_F(DagRays, ThreadsDoNotChangeTheHits) {
   std::vector<Coordinates> origins, directions;
   for (const Ray& ray : many_rays(16, 9))

@@ -40,8 +40,8 @@ class DamagedBlocks : public testing::Test {
     ASSERT_GT(file->checksum_table_offset(), 4 * 65536u);
   }
 
-  // Encodes all tiles, then all pages. The contents are empty where a damaged block is found. Any
-  // other exception fails the test.
+  // Encodes all tiles, then all pages. A tile or page for which DamagedBlock is thrown gets empty
+  // contents. Any other exception fails the test.
   std::vector<Words> read(bool with_checks) {
     const auto file = open_global_file(path_);
     const query::DagView dag(*file);

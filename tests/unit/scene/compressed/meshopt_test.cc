@@ -28,7 +28,7 @@ std::vector<unsigned char> encode_sequence(const std::vector<uint32_t>& indices)
   return out;
 }
 
-// Returns the indices after encoding and decoding them. The codec may rotate the corners of
+// Returns the indices after encoding and decoding them. The codec can rotate the corners of
 // triangles, so a scene with uncompressed indices has equal triangles only if it stores the decoded
 // indices.
 std::vector<uint32_t> turned(const std::vector<uint32_t>& indices) {
@@ -310,7 +310,7 @@ TEST(GltfMeshopt, IsRefusedWithoutTheLibrary) {
 
 #endif
 
-// Compressed views that no drawn mesh uses may have any fault.
+// Compressed views that no drawn mesh uses are not checked, so they can have any fault.
 TEST(GltfMeshopt, UnusedViewsMayBeBroken) {
   SceneBuilder scene = one_triangle();
   const auto expected = triangles_of_file(scene.glb());

@@ -163,7 +163,8 @@ TEST(Las, BrokenHeadersAreNamed) {
   EXPECT_THAT(message_with<double>(155, HUGE_VAL), HasSubstr("offset inf of X"));
 }
 
-// A point is invalid if the scale makes a coordinate infinite. The error contains its number.
+// A point is invalid if the scale makes a coordinate infinite. The error contains the number of the
+// point.
 TEST(Las, PointsThatAreNotFiniteAreNamedOrSkipped) {
   LasBuilder las;
   las.scale[1] = std::numeric_limits<double>::max();

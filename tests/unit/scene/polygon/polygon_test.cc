@@ -140,9 +140,10 @@ TEST(Polygon, LargeShapesAreCovered) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
 }
 
-// Polygons that a fan of triangles from the first corner covers are divided into this fan: convex
-// polygons, and others of which the first corner sees every point. The same holds for polygons
-// whose coordinates are floats and that are convex up to rounding.
+// A polygon is divided into the fan of triangles from its first corner if this fan covers the
+// polygon. This holds for convex polygons, and for other polygons whose first corner sees every
+// point. It also holds for polygons whose coordinates are floats and that are convex up to
+// rounding.
 TEST(Polygon, FansAreKept) {
   MemoryBudget budget(uint64_t{64} << 20);
   polygon::Triangulator triangulator(budget, "a test");

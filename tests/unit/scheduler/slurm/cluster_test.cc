@@ -1,4 +1,5 @@
-// Builds on a cluster. The test simulates Slurm (played_slurm.h).
+// Builds on a cluster. Each Slurm task builds a batch: some of the subvolumes. The test simulates
+// Slurm (played_slurm.h).
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -408,8 +409,8 @@ TEST_F(Cluster, AnotherAttemptFindsTheRecord) {
   slurm_.before_task = [&](uint32_t) {
     slurm_.before_task = nullptr;
     CancelToken never;
-    // A second attempt at batch 0 finds the completion record of the first, and does not build
-    // again.
+    // A second attempt at batch 0 finds the completion record of the first attempt, and does not
+    // build again.
     const BatchRun run{.work_folder = output() + ".work",
                        .batch = 0,
                        .program = kVersion,

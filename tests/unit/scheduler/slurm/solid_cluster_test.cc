@@ -68,8 +68,8 @@ TEST_F(Cluster, ASplitSubvolumeOfASolidHasTheSameBytes) {
   expect_same_solid(build(one), local);
 }
 
-// The next run of a failed build reads the saved rows. A build on this machine can also continue
-// the failed build.
+// The next run of a failed build reuses the results of the stage `rows` that the failed build has
+// saved. A build on this machine can also continue the failed build.
 TEST_F(Cluster, AFailedBuildOfASolidGoesOn) {
   const BuildReport local = run_build(with_rule(local_spec(), SolidName::kWinding), context());
   expected_ = local.sha256;

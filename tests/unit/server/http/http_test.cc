@@ -140,7 +140,7 @@ TEST(SlowConnections, SlowTransfersAreEvicted) {
   EXPECT_FALSE(table.admit(-1, "10.0.0.3", slow)) << "only the fast one waits";
 }
 
-// A connection that waits for the rest of a short body may be replaced at any time.
+// A connection that waits for the rest of a short body can be replaced immediately.
 TEST(SlowConnections, ShortBodiesAreEvictedWithoutDelay) {
   HttpLimits limits;
   limits.max_connections = 1;

@@ -78,7 +78,8 @@ TEST_F(Deliveries, AreDueInOrder) {
   EXPECT_TRUE(std::isinf(store_.next_time_s(30)));
 }
 
-// A new database begins at the given event. An existing database continues at its own.
+// A new database begins at the event that its constructor gets. An existing database ignores this
+// event, and continues at the last event that it has stored.
 TEST_F(Deliveries, AreStoredWithTheirEvents) {
   EXPECT_EQ(store_.last_event(), 5);
   store_.add(delivery("a", 9, 0));

@@ -95,7 +95,7 @@ TEST_F(ArtifactTest, ChildIndicesOfFourBytesComeBack) {
   EXPECT_EQ(frame.children, children);
 }
 
-// A level may be appended in pieces of any size. The artifact has the same bytes.
+// If a level is appended in pieces of any size, the artifact has the same bytes.
 TEST_F(ArtifactTest, PiecesMakeTheSameArtifactAsAWhole) {
   const SubDag dag = random_rows(3, 10000, 9, 1, 64);
   SegmentWriter segment(system_files(), folder_.path(), 0, budget_);

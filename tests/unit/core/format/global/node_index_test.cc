@@ -1,5 +1,5 @@
-// For any words, an index that is made from several spans of a level equals the index of a single
-// walk.
+// Tests the index of a level: the word offsets at which nodes begin. For any words, the index that
+// is made from several spans of the level equals the index that a single walk finds.
 #include "core/format/global/node_index.h"
 
 #include <gmock/gmock.h>

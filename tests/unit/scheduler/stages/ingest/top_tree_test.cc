@@ -25,8 +25,8 @@ FixedTriangle triangle_near(std::mt19937_64& random, int64_t size_units) {
   return t;
 }
 
-// Returns the indexes of the leaves that the triangle touches, by an exact overlap test with each
-// leaf.
+// Returns the indexes of the subvolumes (the leaves of the plan) that the triangle touches, by an
+// exact overlap test with each subvolume.
 std::vector<size_t> touched_by_brute_force(const FixedTriangle& t,
                                            const std::vector<SubvolumePlan>& leaves) {
   std::vector<size_t> touched;
@@ -206,7 +206,9 @@ TEST(TopTree, PlansAreDisjointAndWithinTheirWeight) {
   EXPECT_NEAR(sum, top.total_weight(), 0.01 * top.total_weight());
 }
 
-// Cubes of large triangles can have more weight than the other cubes.
+// The limit `flat_weight` applies only to flat subvolumes, whose triangles are large. With it, a
+// plan for one large triangle has fewer and heavier subvolumes. A plan for small triangles is
+// unchanged.
 TEST(TopTree, FlatSubvolumesHaveASeparateLimit) {
   MemoryBudget budget(uint64_t{1} << 30);
   constexpr int64_t kGrid = int64_t{kUnitsPerVoxel} << kLevels;
