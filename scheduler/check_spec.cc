@@ -83,8 +83,8 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
   const bool is_first = !own.empty() && !files.exists(WorkFolder::store_path(work_folder));
   own.insert(own.end(), outputs.begin(), outputs.end());
   refuse_inputs(files, own, spec.geometry.scenes);
-  // An output file that begins with a zero byte may be an unfinished file of voxdag, or any other
-  // file. So the outputs are also compared with the files that the scene names.
+  // An output file that begins with a zero byte can be an unfinished file of voxdag, or any other
+  // file. So the outputs are also compared with the files that the scene's files name.
   const bool is_unknown = std::ranges::any_of(outputs, [&](const std::string& path) {
     const auto file = open_if_there(files, path);
     return file && begins_with(*file, std::string_view("\0", 1));

@@ -18,11 +18,11 @@ BuildSpec checked(const BuildSpec& spec);
 // Throws as checked() does.
 BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context);
 
-// Throws Error{kInvalidInput} if the scene reads one of `outputs` or a file of the work folder,
-// because the build would overwrite or remove that file. Always checks the files in `spec`. Checks
-// the files that these files name, such as buffers, in two cases. First, the work folder has files
-// but no job store, so no earlier build has checked the scene. Second, one of `outputs` begins with
-// a zero byte, so it may be a file of voxdag or any other file.
+// Throws Error{kInvalidInput} if a file of the scene is one of `outputs` or a file of the work
+// folder, because the build would overwrite or remove that file. Always checks the scene files that
+// `spec` names. Also checks the files that these files name, such as buffers, in two cases:
+// - The work folder has files but no job store, so no earlier build has checked the scene.
+// - One of `outputs` begins with a zero byte, so it can be a file of voxdag or any other file.
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::span<const std::string> outputs, const BuildContext& context);
 

@@ -19,7 +19,8 @@ namespace {
 
 constexpr uint64_t kMaxReplacedReportBytes = uint64_t{1} << 24;
 
-// Returns the report at `path`, or nullopt if it is missing or about an output of another size.
+// Returns the report at `path`. Returns nullopt if the report is missing, or if the size of its
+// output is not `output_bytes`.
 std::optional<BuildReport> report_at(FileSystem& files, const std::string& path,
                                      uint64_t output_bytes) {
   try {
@@ -33,8 +34,8 @@ std::optional<BuildReport> report_at(FileSystem& files, const std::string& path,
 }
 
 // Returns the report of the build that wrote the output, or nullopt if it is not found. Looks at
-// this build's report path, and then at the default path, which the earlier build may have used. A
-// build that was killed after it renamed the output left its report in a partial file.
+// this build's report path, and then at the default path, which the earlier build can have used. If
+// a build was killed after it renamed the output, its report is still in a partial file.
 std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions& run,
                                             uint64_t output_bytes) {
   const std::string given = report_path(run), usual = default_report_path(run.output);

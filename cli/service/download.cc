@@ -36,8 +36,8 @@ Json file_json(const std::string& path, const client::DownloadResult& result) {
           {"sha256", result.sha256}};
 }
 
-// Returns the names of all files of the download. The server may know formats that this program
-// does not know; they have one file.
+// Returns the names of all files of the download. The server can know formats that this program
+// does not know. A download in such a format has one file.
 std::vector<std::string> output_paths(const DownloadCommand& command) {
   for (const query::ExportFormat& format : query::export_formats())
     if (command.spec.to == format.name) return query::export_paths(format, command.output.path);

@@ -5,7 +5,7 @@
 namespace voxdag::cli {
 namespace {
 
-constexpr double kTimeout_s = 120;  // the server may check a complete scene before it answers
+constexpr double kTimeout_s = 120;  // the server can check a complete scene before it answers
 constexpr uint64_t kMaxTokenBytes = 4096;
 
 std::string trimmed(const std::string& text) {

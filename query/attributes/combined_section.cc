@@ -338,7 +338,8 @@ class CombinedColors {
       const auto file_content =
           content_at(source, static_cast<uint32_t>(source.file_level(level)), *file_code);
       if (!file_content) continue;
-      // The source has voxels in the region, so values of the sources after it may not be used.
+      // The source has voxels in the region. Its values come first, so the region cannot be copied
+      // from a later source.
       const bool is_same =
           has_same_regions(source, 0) && has_same_cells(source, level, cube.content, *file_content);
       return is_same ? i : kEncoded;

@@ -10,11 +10,11 @@
 //   2. otherwise B's value, if B has the attribute and a voxel in the cell;
 //   3. otherwise the fill color.
 //
-// If the finest cells of a file are larger than the cells of the result, the value is the value of
-// the larger cell that contains the cell. If B is moved and its cells do not align with the
-// result's cells, the value is the value of the cell of B that has voxels, has the size of the
-// result's cell, and overlaps it most. On ties, it is the cell with the lowest x, then the lowest
-// y, then z.
+// If the finest cells of a file are larger than the cells of the result, a cell of the result gets
+// the value of the larger cell that contains it. If B is moved and its cells do not align with the
+// result's cells, a cell of the result gets the value of the cell of B that overlaps it most. This
+// cell of B must have voxels, and it has the size of the result's cell. On ties, the cell with the
+// lowest x is used, then the cell with the lowest y, then the cell with the lowest z.
 //
 // The color of a coarser cell is the mean, in linear light, of the cell's finest cells. The other
 // attributes have rules for coarser cells (docs/format.md).

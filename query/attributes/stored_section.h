@@ -44,7 +44,7 @@ class StoredSection {
   EncodedRegion copy_region(const voxdag_reader::ColorTier& tier, uint64_t code,
                             uint64_t morton) const;
   // Returns value i of a region, for an attribute other than color. The value belongs to the cell
-  // at `code` on `level`, which is named in an error.
+  // at `code` on `level`. Error messages name this cell.
   uint32_t value(const voxdag_reader::ColorRegion& region, uint64_t i, uint32_t level,
                  uint64_t code) const;
   // Throws an error for a cell without a valid value; `what` is the predicate of the message.

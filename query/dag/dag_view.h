@@ -7,7 +7,7 @@
 //     a brick (4x4x4 voxels)         L - 2        the brick's 64-bit mask
 //     an octant of a brick (2x2x2)   L - 1        the mask of the octant's 8 voxels
 //     a voxel                        L            1
-// The file may be damaged, so every offset is checked. A bad offset throws Error{kCorrupt}.
+// The file can be damaged, so every offset is checked. A bad offset throws Error{kCorrupt}.
 // Immutable; any number of threads may read concurrently.
 #pragma once
 

@@ -33,8 +33,8 @@ namespace voxdag::query {
 namespace {
 
 // Minimum memory share of a worker, enough for any cube of a few bricks. kOutsideShareBytes is the
-// memory that a worker needs in addition to its share: for the segment that it writes, for the
-// words that it has read from the file, and for the pages that it retains for its next cube.
+// memory that a worker needs in addition to its share. It holds the segment being written, words of
+// the file, and memory pages that the worker retains for its next cube.
 constexpr uint64_t kMinShareBytes = uint64_t{8} << 20;
 constexpr uint64_t kOutsideShareBytes =
     kSegmentWriterBytes + NodeReader::kMemoryBytes + ConsingMemory::kMinPageBytes;

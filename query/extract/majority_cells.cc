@@ -128,7 +128,8 @@ uint8_t MajorityCells::children(const voxdag_reader::Node& node) const {
 }
 
 bool MajorityCells::is_set(uint64_t offset) const {
-  // The constructor has checked the offset, but the file may have changed.
+  // The constructor has checked all pointers to this level, but another program can have changed
+  // the file since then.
   if (offset / 128 >= bits_.size()) refuse_missing_node(file_.path(), level_, offset);
   return bits_[offset / 128] >> offset / 2 % 64 & 1;
 }

@@ -18,9 +18,9 @@ namespace voxdag::query {
 // Maximum number of levels of nodes in a tile of a package. It is smaller than for the tiles of the
 // service: a viewer can only load complete blocks, and so loads many tiles that it does not need.
 inline constexpr uint32_t kPackageTileLevels = 2;
-// Number of tiles in a block. The last block of a band (PackageBand) may have fewer.
+// Number of tiles in a block. The last block of a band (PackageBand) can have fewer.
 inline constexpr uint32_t kBlockTiles = 64;
-// Number of blocks that a page of the directory describes. The last page may describe fewer.
+// Number of blocks that a page of the directory describes. The last page can describe fewer.
 inline constexpr uint64_t kPageBlocks = 4096;
 // Maximum size of the first pack. Viewers read this pack completely when they start.
 inline constexpr uint64_t kFirstPackBytes = uint64_t{256} << 10;

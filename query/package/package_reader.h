@@ -23,8 +23,9 @@ class PackageReader {
   const PackageIndex& index() const { return index_; }
   // Returns the number L of levels of the grid, which has 2^L voxels per edge.
   uint32_t grid_levels() const { return grid_levels_; }
-  // Returns the words of a tile, as encode_tile() returns them, with one difference: for a node at
-  // which the tile ends, they have the number of the tile that begins there, not a word offset.
+  // Returns the words of a tile, as encode_tile() returns them, with one difference. A node at
+  // which the tile ends is the root of another tile. The words have the number of this other tile
+  // instead of the node's word offset.
   // `number` is the number of the tile among the tiles whose roots are on `level`. Throws
   // Error{kNotFound} if the package has no such tile, and Error{kCorrupt} if its block is damaged.
   std::vector<uint32_t> tile(uint32_t level, uint64_t number) const;

@@ -193,8 +193,8 @@ class PacketWalk {
         cross(min(in * i0, in * i1), max(out * i0, out * i1), job_.t_min, job_.t_max);
     return crossed.inside | crossed.touching;
   }
-  // Returns children of a cell that all rays cross. The bounds are not tight, so some of these
-  // children may be missing in the mask.
+  // Returns children of a cell that all rays cross. The bounds are not tight, so the mask does not
+  // always have all of these children.
   VOXDAG_INLINE uint32_t cross_all(Int4 low, double half) const {
     const Planes i0 = Planes::twice(low_inverse_), i1 = Planes::twice(high_inverse_);
     const Planes planes = Planes::of_cell(low, half);

@@ -42,8 +42,8 @@ class RayCaster {
   // Error{kCorrupt} for a damaged DAG.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit) const;
   // Like the other cast(), but reads at most `steps_left` nodes and bricks, and subtracts the
-  // number of reads from `steps_left`. If `steps_left` is then 0, the search may have ended early,
-  // and a result of false does not mean that there is no hit.
+  // number of reads from `steps_left`. If `steps_left` is then 0, it is possible that the search
+  // ended early, and a result of false does not mean that there is no hit.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,
             uint64_t& steps_left) const;
 

@@ -67,9 +67,9 @@ class RayWalk {
   }
 
  private:
-  // Visits the children of a cell that the ray crosses and for which has(index) is true, nearest
-  // first. Calls enter_child(index, low corner, out, t) for each, until enter_child() returns true,
-  // which means a hit. Returns true after a hit.
+  // Visits the children of a cell that the ray crosses, nearest first. Leaves out the children for
+  // which has(index) is false. Calls enter_child(index, low corner, out, t) for each child, until
+  // enter_child() returns true, which means a hit. Returns true after a hit.
   template <class Has, class EnterChild>
   bool cross(const double (&low)[3], double half, const double (&out)[3], double t, const Has& has,
              const EnterChild& enter_child);

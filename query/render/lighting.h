@@ -16,8 +16,8 @@ class Lighting {
  public:
   // Places the sun. `box` is the box of the occupied cells. If the camera is outside the box and
   // above the box's lower side, a floor below the scene shows the scene's shadow. `seen` has
-  // samples of the visible surface, nearest first. If there is no floor, the sun is placed so that
-  // it lights about a third of these samples.
+  // samples of the surface that the camera sees, nearest first. If there is no floor, the sun is
+  // placed so that it lights about a third of these samples.
   Lighting(const DagView& dag, const Box& box, const Camera& camera,
            const std::vector<SurfaceHit>& seen);
 

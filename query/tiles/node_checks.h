@@ -21,7 +21,7 @@ class NodeChecks {
 
   // Throws DamagedBlock if the node or brick at this word offset is damaged. The offset may have
   // any value; an offset outside the level is not checked. Checks the bytes of a node of maximum
-  // size, because the first word, which determines the node's size, may itself be damaged.
+  // size, because the first word, which determines the node's size, can itself be damaged.
   void expect_intact(uint64_t offset) const {
     if (blocks_ && offset < words_) blocks_->expect_intact_at(place_ + 4 * offset, bytes_);
   }

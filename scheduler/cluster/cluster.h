@@ -75,8 +75,8 @@ class MergeJob {
 std::unique_ptr<MergeJob> make_merge_job(const BuildSpec& spec, const TriangleSource& scene,
                                          const BuildContext& context);
 
-// Builds with and without cluster options call the following functions, because an earlier run in
-// the same work folder may have started tasks.
+// Builds with and without cluster options call the following functions, because it is possible that
+// an earlier run in the same work folder has started tasks.
 
 // Records in the job store the results of tasks that an earlier run started for the scene with this
 // digest. Throws Error{kInvalidInput} if there are such tasks and this program has no cluster
@@ -85,8 +85,8 @@ void accept_earlier_tasks(BuildJob& job, const std::string& scene_digest);
 // Stops the cluster tasks of the work folder and removes their files. Only warns if Slurm does not
 // accept the request: a remaining task will fail because its batch file is missing.
 void remove_tasks(BuildJob& job);
-// Stops the merge job of an earlier build, because that job may have locked the output and the work
-// folder. Only warns if the job cannot be stopped.
+// Stops the merge job of an earlier build, because that job can hold the locks of the output and
+// the work folder. Only warns if the job cannot be stopped.
 void stop_earlier_merge_job(const BuildSpec& spec, const BuildContext& context);
 // Stops the merge job (unless this process is the merge job), then all tasks of the cluster build
 // in a work folder. Does nothing without a cluster build. If Slurm does not accept the request,

@@ -61,7 +61,7 @@ class BatchTable {
   // Forgets earlier failures, so that each batch has the full number of retries in this run.
   void forget_failures();
   // Removes a batch and its file, and throws Error{code, why}. The next run writes a new batch file
-  // from the triangles of the scene, because the removed file may have caused the error.
+  // from the triangles of the scene, because the removed file can be the cause of the error.
   [[noreturn]] void give_up(uint32_t batch, ErrorCode code, const std::string& why);
 
   void save();

@@ -27,7 +27,8 @@ struct CutBatches {
   std::vector<size_t> first_items;  // index of the first subvolume of each batch
 };
 // Divides the subvolumes, in the given order, into at most `most` batches, numbered from
-// `first_number`. All other fields of each batch are copies of the fields of `like`.
+// `first_number`. The other fields of the batches are copies of the fields of `like`, which must
+// have no subvolumes.
 CutBatches make_batches(const Batch& like, std::span<const BatchSubvolume> subvolumes,
                         uint64_t most, uint32_t first_number);
 

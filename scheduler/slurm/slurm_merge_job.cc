@@ -39,8 +39,8 @@ std::string last_lines(FileSystem& files, const std::string& path) {
   }
 }
 
-// Returns the error code with which voxdag ended the job, found from the exit status that Slurm
-// reports as STATUS:SIGNAL; kIo if the job ended for another reason.
+// Returns the error code with which voxdag ended in the job. Slurm reports voxdag's exit status as
+// STATUS:SIGNAL. Returns kIo if the job ended for another reason.
 ErrorCode code_of(const SlurmEnd& end) {
   if (end.state != "FAILED") return ErrorCode::kIo;
   for (int code = 0; code <= static_cast<int>(ErrorCode::kLimit); ++code)

@@ -182,7 +182,8 @@ void TaskPoller::submit(const std::vector<uint32_t>& batches) {
   }
   batches_.record_submission(unix_seconds());
   batches_.try_save();
-  // Slurm may have accepted the array although sbatch failed. The next poll finds its tasks.
+  // If sbatch fails, it is still possible that Slurm has accepted the array. The next poll then
+  // finds its tasks.
   warn_refusal(refusal);
 }
 
@@ -219,7 +220,7 @@ std::string TaskPoller::try_submit_merge_job() {
     if (error.code() != ErrorCode::kIo) throw;
     warn_refusal(error.message());
   }
-  // Slurm may have accepted the job although sbatch failed.
+  // If sbatch fails, it is still possible that Slurm has accepted the job.
   return find_job(request.name);
 }
 

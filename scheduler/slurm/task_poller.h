@@ -41,7 +41,7 @@ class TaskPoller {
   std::vector<uint32_t> end_missing(const std::set<uint32_t>& listed);
   bool is_over(const OpenBatch& batch);
   void cancel_held(const std::vector<SlurmTask>& tasks, std::set<uint32_t>& listed);
-  // The next step for a batch whose task Slurm does not list. kWait: the task may still be active.
+  // The next step for a batch whose task Slurm does not list. kWait: the task can still be active.
   // kStop: Slurm does not answer, so the remaining batches are not examined either.
   enum class Next { kWait, kStop, kResubmit, kSplit };
   Next end_attempt(OpenBatch& batch);

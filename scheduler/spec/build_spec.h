@@ -123,8 +123,8 @@ struct RunOptions {
   // Ingest makes checkpoints only for scenes with at least this many triangles. Smaller scenes are
   // read again instead, which takes at most about two CPU seconds.
   uint64_t durable_min_triangles = uint64_t{4} << 20;
-  // Maximum seconds to wait for locks held by another build, because that build may be about to
-  // end.
+  // Maximum seconds to wait for locks that another build holds. The other build can be about to
+  // end, so the wait is worthwhile.
   double lock_wait_s = 30;
   bool keep_work = false;
   bool restart = false;      // discard the job in the work folder and start over

@@ -3,8 +3,8 @@
 //
 // The key is the SHA-256 of the canonical content. The content has the snapped triangles relative
 // to the cube. The corners within each triangle are sorted, the triangles are sorted, and
-// duplicates are removed. The content also has the cube's edge, the hash bits, the rule, and a
-// version that increases whenever artifacts change. For a solid, the triangles keep their
+// duplicates are removed. The content also has the cube's edge, the hash bits, the voxel rule, and
+// a version that increases whenever artifacts change. For a solid, the triangles keep their
 // orientation and their duplicates, and the content has the rule of the solid and the views from
 // the low faces of the cube (SolidEntry). The views are the only data from outside the cube on
 // which the voxels of a subvolume depend. The cache is a folder with one file per entry. When the

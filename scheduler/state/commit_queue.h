@@ -23,9 +23,9 @@ class CommitQueue {
  public:
   static constexpr uint64_t kGroupBytes = uint64_t{256} << 20;
 
-  // A group is committed once it has `group_bytes`, or after `interval_s` unless the previous group
-  // is still being committed. A crash loses the subvolumes being built, the group being filled and
-  // the group being committed.
+  // A group is committed when its artifacts take `group_bytes` bytes. It is also committed
+  // `interval_s` seconds after it was begun, unless the previous group is still being committed. A
+  // crash loses the subvolumes being built, the group being filled and the group being committed.
   CommitQueue(JobStore& jobs, std::unique_ptr<SegmentWriter> segment, TriangleStore& triangles,
               double interval_s, uint64_t group_bytes = kGroupBytes)
       : jobs_(jobs),

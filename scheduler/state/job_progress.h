@@ -2,8 +2,8 @@
 // `voxdag status` can show it from another process. A short build ends before the first write, so
 // its store needs no file. Thread-safe.
 //
-// When a write is due, the calling thread lists the work folder and writes the row; no other thread
-// waits for it. Writing the row takes too little time to need a separate thread.
+// When a write is due, the thread that reports progress lists the work folder and writes the row of
+// the progress. No other thread waits for it. This takes too little time to need a separate thread.
 #pragma once
 
 #include <mutex>

@@ -38,7 +38,7 @@
 
 namespace voxdag {
 
-// Properties that must be equal to resume a build.
+// Properties of a job. A build resumes a stored job only if all of them are equal.
 struct JobIdentity {
   std::string scene_digest;  // digest of the grid and the snapped triangles
   std::string geometry;      // geometry options as JSON (geometry_json())

@@ -93,7 +93,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
                                     read_own_file(files_, lock_path, 1 << 12) +
                                     ": expected no other build in this folder");
   const std::string holder = "process " + std::to_string(getpid()) + " on " + host_name();
-  // create() empties the file, because the previous holder's text may have been longer.
+  // create() empties the file, because the previous holder's text can be longer.
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 
@@ -167,8 +167,8 @@ void WorkFolder::remove_garbage(const std::function<bool(uint32_t segment)>& is_
   }
 }
 
-// Removes the files, and the folder if it is then empty. Running tasks may add files at any time;
-// the folder remains if they do.
+// Removes the files, and the folder if it is then empty. Running tasks can add files at any time.
+// Then the folder remains.
 void WorkFolder::remove_cluster_files() {
   if (!files_.exists(cluster_path())) return;
   for (const DirectoryEntry& entry : files_.list(cluster_path())) {
@@ -178,7 +178,7 @@ void WorkFolder::remove_cluster_files() {
       remove_silently(path);
       continue;
     }
-    // The attempt's task may remove the folder at the same time.
+    // The attempt's task can remove the folder at the same time.
     try {
       for (const DirectoryEntry& inner : files_.list(path))
         if (segment_id(inner.name)) remove_silently(path + "/" + inner.name);

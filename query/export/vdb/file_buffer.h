@@ -19,7 +19,7 @@ class FileBuffer : public std::streambuf {
   // `total_bytes` is an estimate of the bytes that will be written. The stage must have this total.
   FileBuffer(ExportFile& file, ExportStage& stage, uint64_t total_bytes)
       : file_(file), stage_(stage), left_bytes_(total_bytes) {}
-  // Advances the stage to its total, because fewer bytes may have been written than estimated.
+  // Advances the stage to its total, because the library can write fewer bytes than estimated.
   void finish() { advance(left_bytes_); }
   void check() const {
     if (failure_) std::rethrow_exception(failure_);

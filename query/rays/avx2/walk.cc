@@ -1,6 +1,7 @@
-// This file is compiled for AVX2. No function of this file except walk_packet_avx2() may be called
-// on a CPU that lacks the instructions that the compiler may use here. So walk_packet_avx2() checks
-// the CPU first, and returns a null pointer instead of walk() if an instruction is missing.
+// This file is compiled for AVX2. If a CPU lacks one of the instructions that the compiler can use
+// here, only walk_packet_avx2() may be called on it, and no other function of this file. So
+// walk_packet_avx2() checks the CPU first. It returns a null pointer instead of walk() if an
+// instruction is missing.
 #include <immintrin.h>
 
 #include "query/rays/packet_walk.h"

@@ -114,7 +114,8 @@ class Slurm {
   // Returns a setting of slurm.conf, "" if unknown.
   std::string setting(const std::string& name);
   // True if Slurm refused the request because of missing nodes, at most start_s_ seconds after the
-  // first such refusal: Slurm may have just started and not know its nodes yet.
+  // first such refusal. It is then possible that Slurm has just started and does not know its nodes
+  // yet.
   bool may_be_starting(const CommandResult& refused);
 
   CommandRunner& commands_;
@@ -126,8 +127,8 @@ class Slurm {
   std::optional<std::string> configuration_;
 };
 
-// True if a task that waits for this reason will start without help; false if a person may have to
-// act.
+// True if a task that waits for this reason will start without help. False if it is possible that a
+// person must act first.
 bool waits_for_its_turn(const std::string& reason);
 
 // Splits a text into words as a shell does: at blanks outside of quotes. A backslash outside of

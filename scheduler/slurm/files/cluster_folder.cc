@@ -26,8 +26,8 @@ bool consume_prefix(std::string_view& text, std::string_view prefix) {
   return true;
 }
 
-// Calls `remove` and ignores errors: another process may have removed the file already, or may
-// still be writing it. A remaining file costs only space.
+// Calls `remove` and ignores its errors. It is possible that another process has already removed
+// the file, or is still writing it. A remaining file costs only space.
 template <class Remove>
 void try_to_remove(const Remove& remove) {
   try {

@@ -40,8 +40,8 @@ BackendChoice choose_automatically(const Gpus& gpus, uint64_t memory_bytes, Prog
 // Compares a backend with the CPU backend on this machine, because a faulty driver or device could
 // produce wrong voxels unnoticed. Builds a few small subvolumes, with 1200 triangles of all sizes
 // and with several hash lengths. Returns "" if all level arrays and counts are equal, else a
-// sentence with the difference. Propagates the backend's exceptions. The CPU's part takes about 30
-// ms.
+// sentence with the difference. Propagates the backend's exceptions. Building the subvolumes on the
+// CPU takes about 30 ms.
 std::string difference_from_cpu(Backend& backend);
 
 }  // namespace voxdag

@@ -1,7 +1,7 @@
 // The two passes over a scene. The scan finds its bounds. Ingest snaps its triangles to the grid,
 // counts them in the top tree and stores them in the scene's bin.
 //
-// Resume rule: scan and ingest continue from the given state, which an earlier run may have saved.
+// Resume rule: scan and ingest continue from the given state, which an earlier run can have saved.
 //
 // Several threads read the scene in pieces of 16384 declared triangles. The results are processed
 // in the order of the pieces, so the state and the plan do not depend on the number of threads.

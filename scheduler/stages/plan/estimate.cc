@@ -39,7 +39,7 @@ constexpr double kMaxDiskBytesPerNode = 40;
 // CPU time per DAG node of a build, divided by the CPU time per DAG node of its pilot. Measured on
 // real scenes.
 constexpr double kBuildOverPilotTime = 1.5;
-// CPU time of a build that reorders its nodes, over the time of a build that does not.
+// CPU time of a build that reorders its nodes, divided by the time of a build without reordering.
 constexpr double kReorderTime = 1.3;
 // Upper bound of the cells per brick. A surface that crosses a brick sets about 16 of its voxels.
 constexpr double kMaxCellsPerBrick = 32;

@@ -23,7 +23,7 @@ class PilotRows {
   // Charges the views to the budget. Throws OutOfBudget.
   PilotRows(MemoryBudget& budget, uint32_t levels);
   // Computes the views from all triangles of the pilot. If `beyond` is not null, also reads this
-  // scene's triangles beyond the grid. `grid` is the scene's grid, which may be finer than the
+  // scene's triangles beyond the grid. `grid` is the scene's grid, which can be finer than the
   // pilot's. Throws OutOfBudget.
   void read(SolidRule rule, TriangleStream& triangles, BuildScene* beyond, Grid grid,
             const StageContext& context);

@@ -3,9 +3,9 @@
 //
 // Resume rule: the job store records the file's SHA-256 before the rename. A later run verifies the
 // output by this digest and does not write it again. The job store of a short build is lost if the
-// build is killed. A later run then builds the output again. It may replace the output, because the
-// report, which was written as "<report>.partial" before the rename, describes it
-// (scheduler/replaced_result.h).
+// build is killed. A later run then builds the output again. It is allowed to replace the existing
+// output, because the report of the killed build describes this output
+// (scheduler/replaced_result.h). That report was written as "<report>.partial" before the rename.
 #pragma once
 
 #include <functional>

@@ -242,7 +242,8 @@ void IngestCheckpoint::forget() {
 
 void IngestCheckpoint::forget_saved() {
   if (!jobs_) return;
-  // The file is removed first: a full disk may have no other space for a commit of the job store.
+  // The file is removed first. On a full disk, it can be the only source of the free space that a
+  // commit of the job store needs.
   work_.remove_durable();
   jobs_->forget_ingest();
 }
