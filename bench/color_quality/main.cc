@@ -37,7 +37,7 @@ struct Arguments {
 // For each sampled cell, the triangles that touch it or are near it.
 struct Neighborhood {
   std::vector<FixedSurface> surfaces;
-  std::vector<std::vector<uint32_t>> near;  // per cell: indices of the surfaces near it
+  std::vector<std::vector<uint32_t>> near;  // for each cell, the indices of the surfaces near it
 };
 
 Neighborhood find_surfaces(TriangleSource& scene, const Grid& grid, const SampledCells& cells) {

@@ -10,9 +10,9 @@
 namespace voxdag::query {
 
 struct QuerySet {
-  std::vector<Position> uniform;                 // points of the grid
+  std::vector<Position> uniform;                 // random points, uniform in the grid
   std::vector<Position> set_cells;               // random set cells
-  std::vector<Coordinates> origins, directions;  // rays of a picture, in tiles of 8 x 8 pixels
+  std::vector<Coordinates> origins, directions;  // rays of a picture, tile by tile (8 x 8 pixels)
 };
 
 // Number of boxes, and their edge in cells. box_around() returns box i, which is centered on the

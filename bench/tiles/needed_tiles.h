@@ -109,8 +109,8 @@ class NeededTiles {
   double inverse_[3] = {};
   int nearest_ = 0;                  // the child that a ray of this direction meets first
   std::array<uint64_t, 24> path_{};  // contents of the cells on the current path, by level
-  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};  // last marked content + 1,
-                                                                       // by depth and level
+  // marked_[depth][level]: the content of the tile's root that was marked last, plus 1.
+  std::array<std::array<uint64_t, 24>, kMaxTileLevels + 1> marked_{};
   std::vector<Addresses> tiles_;
 };
 

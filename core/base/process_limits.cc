@@ -117,7 +117,7 @@ struct ProcessLimit {
   int reason;
   __rlimit_resource resource;
   const char* name;
-  bool is_size;  // true: a size in bytes, false: a number
+  bool is_size;  // true: a size in bytes, false: a count
 };
 
 constexpr ProcessLimit kLimits[] = {

@@ -20,7 +20,7 @@ enum class Attribute : uint32_t { kColor = 1, kAlpha = 2, kNormal = 3, kMaterial
 // How the global file stores the value of a cell.
 enum class Encoding : uint8_t {
   kColorBlock,  // the colors of 32 cells in 16 bytes (block_codec.h)
-  kByte,        // 0 to 255
+  kByte,        // one byte, 0 to 255
   kOctahedral,  // a unit vector in two bytes, each 0 to 254 (normal_code.h)
   kNameIndex,   // an index into a list of names, which is stored after the values
 };
@@ -74,7 +74,7 @@ struct AttributeTraits {
   const char* name;    // name in options, JSON and messages
   const char* plural;  // plural of the name, in arrays, sections and messages
   Encoding encoding;
-  bool uses_images = false;       // depends on the scene's textures
+  bool uses_images = false;       // the attribute depends on the scene's textures
   const char* ply_properties[3];  // names of a value's components
   // value_of_cell() returns the value of a cell of the finest level, from the sums of its surfaces.
   // value_of_parent() returns the value of a coarser cell from its set children. Both are null for

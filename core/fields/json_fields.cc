@@ -7,8 +7,8 @@ namespace voxdag::json_fields {
 
 namespace {
 
-constexpr size_t kMaxShownBytes = 64;  // bytes of a text
-constexpr size_t kMaxShownItems = 8;   // items of an array
+constexpr size_t kMaxShownBytes = 64;  // bytes of a text that messages show
+constexpr size_t kMaxShownItems = 8;   // items of an array that messages show
 
 // Returns a value as text for messages: printable ASCII of limited length. Does not show the
 // contents of an object or of a nested array, because formatting deeply nested JSON recurses and

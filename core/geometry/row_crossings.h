@@ -79,7 +79,7 @@ class FirstBeyond {
 struct SampleRows {
   int64_t low[3];  // the cube's low corner, in lattice units
   int pitch_log2;
-  int blocks;  // the cube's edge, in multiples of the distance
+  int blocks;  // the cube's edge, in multiples of the rows' distance
 
   // Returns the index of row (i, j) in the list of the cube's rows along one axis (solid_rule.h).
   size_t index(int i, int j) const { return static_cast<size_t>(i * (blocks + 1) + j); }

@@ -10,7 +10,7 @@ namespace voxdag {
 enum class ImageDecoder { kNone, kPng, kJpeg, kWebp, kAvif };
 
 struct ImageFormat {
-  const char* name;                            // "a GIF image"
+  const char* name;                            // such as "a GIF image"
   const char* remedy = "";                     // instruction for users to get a readable image
   ImageDecoder decoder = ImageDecoder::kNone;  // the format's decoder, if the program has it
   bool is_image = true;

@@ -21,7 +21,7 @@ struct Plane {
 struct YuvPlanes {
   uint32_t width = 0, height = 0;
   int bits = 8;
-  bool is_limited = false;        // luma is in 16..235, chroma in 16..240, for 8 bits
+  bool is_limited = false;        // with 8 bits, luma is in 16..235, chroma in 16..240
   bool is_premultiplied = false;  // colors are multiplied by alpha
   int matrix = 0;                 // MatrixCoefficients of H.273
   bool halves_width = false, halves_height = false;  // chroma has half the width, half the height
@@ -48,7 +48,7 @@ class YuvRows {
   double red_ = 0, blue_ = 0;  // weights of red and blue in luma
   double max_ = 255;           // largest number of a plane
   double luma_low_ = 0, luma_range_ = 255, chroma_range_ = 255;
-  std::vector<double> chroma_[2];  // of the current row, from -0.5 to 0.5
+  std::vector<double> chroma_[2];  // chroma of the current row, from -0.5 to 0.5
 };
 
 }  // namespace voxdag

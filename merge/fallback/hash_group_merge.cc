@@ -8,12 +8,13 @@
 namespace voxdag {
 namespace {
 
-constexpr uint32_t kMaxEncodedWords = 1 + kMaxRowWords;  // a row in the scratch file: mask, words
+// Maximum words of a row in the scratch file: its mask and its words.
+constexpr uint32_t kMaxEncodedWords = 1 + kMaxRowWords;
 
 // The rows of one run (merge/load/row.h) that belong to the group of all rows with one hash.
 struct GroupRun {
   size_t run = 0;
-  uint64_t first_row = 0;  // first row of the group in the run
+  uint64_t first_row = 0;  // index, in the run, of the group's first row
   uint64_t rows = 0;
   uint64_t begin_word = 0, end_word = 0;  // the rows' words in the scratch file
 };
@@ -90,7 +91,7 @@ class GroupFile {
   ScratchFile file_;
   std::vector<GroupRun> runs_;
   PageBuffer<uint32_t> buffer_;
-  uint64_t written_ = 0;  // words in the file
+  uint64_t written_ = 0;  // words written to the file
   size_t buffered_ = 0;
 };
 
@@ -149,7 +150,7 @@ class GroupCursor {
   // Buffer with an even number of words. The first `pending_` words are positions that are not yet
   // stored in maps_.
   std::span<uint32_t> positions_;
-  uint64_t next_word_;  // first word of the file that is not read yet
+  uint64_t next_word_;  // index of the first word of the file that is not read yet
   uint64_t rows_left_;
   size_t at_ = 0, filled_ = 0;  // word indices in buffer_: current row, end of the rows
   uint64_t stored_ = 0;         // rows whose positions were stored in maps_

@@ -51,7 +51,7 @@ class OrderedRowWriter {
   LevelOutput& output_;
   const RowFormat format_;
   MergedRows buffer_;
-  uint64_t flushed_;  // position after all written rows
+  uint64_t flushed_;  // position after the last written row
   uint64_t nodes_ = 0;
   bool any_ = false;
   RowKey last_;

@@ -32,7 +32,7 @@ struct RunSlice {
   FrameSpan frames;
   uint64_t first_row = 0;  // index of the first row in the run
   RowCount size{};
-  uint64_t row_base = 0, word_base = 0;  // first row and word in the columns
+  uint64_t row_base = 0, word_base = 0;  // indices of the first row and word in the columns
 };
 
 // The offset of a row in a slice: the number of rows before it, and the number of their words.

@@ -58,7 +58,7 @@ class PositionMaps {
   uint64_t first_word(size_t run) const { return first_[run] << wide_; }
   uint64_t total_words() const { return first_.back() << wide_; }
 
-  std::vector<uint64_t> first_;  // for each run, the rows of all runs before it; then the total
+  std::vector<uint64_t> first_;  // by run: number of rows in all runs before it; then the total
   bool wide_;
   PageBuffer<uint32_t> words_;
   std::shared_ptr<ScratchFile> file_;

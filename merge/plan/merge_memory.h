@@ -21,7 +21,7 @@ namespace voxdag {
 struct MergeMemory {
   unsigned workers = 1;
   uint64_t worker_bytes = 0;    // per worker
-  uint64_t resident_bytes = 0;  // position maps of one level
+  uint64_t resident_bytes = 0;  // limit for one level's position maps in memory
   uint64_t partition_bytes = 0;
 
   static MergeMemory divide(uint64_t bytes, unsigned threads) {

@@ -69,7 +69,7 @@ class CudaDevice {
     Event copied;
   };
 
-  int device_ = 0;  // number in the CUDA runtime
+  int device_ = 0;  // the CUDA runtime's number of the device
   std::string place_;
   cudaMemPool_t pool_ = nullptr;  // memory pool of this device
   Pinned<uint64_t> mailbox_;

@@ -155,7 +155,7 @@ class CudaSpace {
   const std::string where_;
   MemoryBudget& budget_;
   const CancelToken& cancel_;
-  MemoryCharge area_charge_;  // for the device's download area
+  MemoryCharge area_charge_;  // charge for the device's download area
   Array<uint8_t> storage_;
   Array<uint64_t> answer_;  // one word, for the results of reductions
 };

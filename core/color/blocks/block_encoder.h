@@ -66,7 +66,7 @@ class BlockEncoder {
   struct Fit {
     uint32_t ends[2];
     alignas(64) uint8_t weights[kBlockCells];
-    int32_t error;  // the sum of squared differences
+    int32_t error;  // sum of the squared differences from the block's colors
   };
 
   VOXDAG_INLINE static int32_t product_of(const int16_t* a, const int16_t* b, size_t count) {

@@ -189,7 +189,8 @@ class RegionBaker {
     static constexpr size_t kBatch = 32;
     struct Cell {
       int64_t p, q;
-      uint32_t columns, cell, weight;  // `cell`: the Morton code, after cover() the number
+      // `cell` is the cell's Morton code, and after cover() the cell's number in RegionCells.
+      uint32_t columns, cell, weight;
       typename color::SurfaceLook<Textures>::Spot spot;
     };
 

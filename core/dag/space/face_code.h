@@ -38,7 +38,7 @@ class FaceReader {
   // A square of the quadtree, without its quadrants.
   struct Square {
     Kind kind = Kind::kSet;
-    std::vector<Piece> pieces;  // kEmpty: one; kBrick: the components at the face
+    std::vector<Piece> pieces;  // kEmpty: one piece; kBrick: one for each component at the face
   };
 
   // `path` is the file that contains the bytes. `path` and `bytes` must outlive the reader.

@@ -39,7 +39,7 @@ class FaceRelations {
   struct Entry {
     uint64_t pairs = 0;
     uint32_t low = 0, high = 0;
-    uint32_t tag = 0;  // depth and axis; 0: free
+    uint32_t tag = 0;  // depth and axis; 0: the entry is free
   };
 
   // Returns the set of a node's components that have a voxel at a face, as bits.

@@ -15,8 +15,8 @@ using CubeVoxel = std::array<uint32_t, 3>;
 struct SeedPlace {
   enum class Kind : uint8_t {
     kSet,     // the voxel is set
-    kOpen,    // its component has a voxel at a face of the root's cube
-    kClosed,  // its component has no voxel at the faces of a node or brick around the voxel
+    kOpen,    // the voxel's component has a voxel at a face of the root's cube
+    kClosed,  // its component has no voxel at the faces of some node or brick around the voxel
   };
   Kind kind = Kind::kSet;
   int depth = 0;           // kClosed: the largest depth of such a node or brick

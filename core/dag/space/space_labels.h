@@ -71,7 +71,7 @@ class SpaceLabels {
     uint8_t touch[kFew] = {};
   };
   struct Depth {
-    PooledArray<Row> rows;  // one more than the nodes
+    PooledArray<Row> rows;  // one row more than the depth has nodes
     PooledArray<uint8_t> touch;
     // For each row, an index in `maps`. From this index on, `maps` has the start of each octant's
     // labels (relative to this index), and then the labels.
@@ -95,7 +95,7 @@ std::vector<uint8_t> connected_components(PooledMemory& memory, SpaceLabels& lab
 struct LabeledCube {
   bool exists = false;  // false: the cube is empty
   uint32_t row = 0;
-  size_t first = 0;  // index of the number of its first component, in the caller's list
+  size_t first = 0;  // index, in the caller's list, of the number of its first component
 };
 
 // Returns octant `octant` of a cube. Appends the numbers of the octant's components to `numbers`,

@@ -32,7 +32,7 @@ inline constexpr uint32_t kFrameRows = 4096;
 struct ArtifactRef {
   uint32_t segment = 0;       // id of the segment file
   uint64_t offset = 0;        // first byte of the artifact
-  uint64_t bytes = 0;         // frames and index together
+  uint64_t bytes = 0;         // size of the frames and the index together
   uint64_t index_offset = 0;  // first byte of the index
   uint64_t checksum = 0;
   bool operator==(const ArtifactRef&) const = default;

@@ -37,7 +37,7 @@ struct CacheEntry {
   ArtifactRef ref;
   ArtifactRoot root;       // the artifact's root, with the cube of the original build
   uint64_t dag_nodes = 0;  // nodes of all levels
-  SolidCounts solid;       // 0 if the subvolume is not of a solid
+  SolidCounts solid;       // all 0 if the subvolume is not of a solid
 };
 
 // Opens the cache entry of `key` and reads its artifact's index. Throws Error{kNotFound} if the

@@ -64,7 +64,7 @@ class SegmentWriter {
   MemoryCharge frame_charge_;
   PageBuffer<std::byte> buffer_;
   std::unique_ptr<FrameEncoder> encoder_;
-  uint64_t written_ = 0;  // bytes in the file
+  uint64_t written_ = 0;  // bytes written to the file
   size_t buffered_ = 0;
   bool name_synced_ = false;
   bool sync_failed_ = false;

@@ -26,7 +26,7 @@ inline constexpr size_t kRegionEntryBytes = 32;
 
 // Offsets in an entry of the tier table, which has an entry for each tier.
 inline constexpr size_t kTierOffsetAt = 0;  // the data's offset from the start of the section
-inline constexpr size_t kTierUnitsAt = 8;   // the data's size in units; the directory follows
+inline constexpr size_t kTierUnitsAt = 8;   // the data's size in units; then the directory follows
 inline constexpr size_t kTierRegionsAt = 16;
 inline constexpr size_t kTierCellsAt = 24;  // number of cells of all levels of the tier
 inline constexpr size_t kTierEntryBytes = 32;

@@ -12,7 +12,8 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kNodesPerRange = uint64_t{1} << 22;  // their HashedNodes take 64 MiB
+// Maximum average number of nodes in a range of hashes. Their HashedNodes take 64 MiB.
+constexpr uint64_t kNodesPerRange = uint64_t{1} << 22;
 
 struct HashedNode {
   uint64_t hash = 0;

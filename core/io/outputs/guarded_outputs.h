@@ -35,7 +35,7 @@ class GuardedOutputs : public ForwardingFiles {
   // The file that may be replaced at a guarded path.
   struct Replaceable {
     bool exists = false;
-    bool is_own = false;  // created by this object: its size and times may change
+    bool is_own = false;  // created by this object: its size and times can change
     FileIdentity identity;
   };
 

@@ -29,7 +29,7 @@ class SpaceReserve : public ForwardingFiles {
   void use(const std::string& path, uint64_t bytes);
 
   const uint64_t reserve_bytes_;
-  std::atomic<uint64_t> unchecked_bytes_{UINT64_MAX / 2};  // written since the last check
+  std::atomic<uint64_t> unchecked_bytes_{UINT64_MAX / 2};  // bytes written since the last check
 };
 
 }  // namespace voxdag

@@ -30,8 +30,8 @@ class MemoGate {
   static constexpr int64_t kWindow = 1024;
   static constexpr int64_t kBypass = 16 * kWindow;
 
-  int64_t lookups_ = 0, misses_ = 0;  // in the current window
-  int64_t bypassed_ = 0;              // blocks until the memo is used again
+  int64_t lookups_ = 0, misses_ = 0;  // counts in the current window
+  int64_t bypassed_ = 0;              // number of blocks until the memo is used again
 };
 
 }  // namespace voxdag::cpu

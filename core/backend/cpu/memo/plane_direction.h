@@ -30,7 +30,7 @@ class PlaneDirection {
     uint32_t id;
     uint32_t voxels : 10;
     uint32_t filled : 10;
-    uint32_t nodes : 4;  // 0: not made yet
+    uint32_t nodes : 4;  // 0: the node is not made yet
   };
 
   void set_up(const Plane& plane, InnerSides inner);
@@ -75,7 +75,7 @@ class PlaneDirection {
   InnerSides inner_;
   int64_t min_offset_, max_offset_;
   double buckets_per_unit_;
-  int64_t values_[kCorners + 1];  // -n.k ascending, then the largest integer
+  int64_t values_[kCorners + 1];  // the values -n.k in ascending order, then the largest integer
   int64_t offsets_[512];
   uint16_t bucket_[kBuckets + 1];  // index of the last element of values_ that is <= every f in the
                                    // bucket

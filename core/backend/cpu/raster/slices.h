@@ -25,7 +25,7 @@ struct Slices {
 // (TileViews::classes_at()), so these components are all inside the solid or all outside.
 struct BlockComponents {
   int count;
-  uint32_t corners[8];  // bit sets, by child index
+  uint32_t corners[8];  // corners of each entry, as a bit set by child index
   bool is_alike[8];     // all corners of the entry have the same class
   Slices voxels[8];
   Slices rest;  // empty voxels of components without a corner

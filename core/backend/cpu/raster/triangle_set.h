@@ -95,7 +95,7 @@ inline NarrowTriangle narrowed(const WideTriangle& t) {
 // iff the triangle's plane touches the voxel, so no edge tests are necessary.
 struct Entry {
   static constexpr uint32_t kInside = 1u << 31;  // the triangle covers the current cube
-  static constexpr uint32_t kWide = 1u << 30;    // the number is the number of a wide triangle
+  static constexpr uint32_t kWide = 1u << 30;    // number() is the number of a wide triangle
   uint32_t bits;
 
   bool inside() const { return bits & kInside; }

@@ -55,7 +55,7 @@ class PlaneViews {
   const SolidRule rule_;
   RunningRows& running_;
   int64_t base_ = 0;      // the plane's value at the tile's low corner
-  int64_t step_[3] = {};  // difference of the values at adjacent corners
+  int64_t step_[3] = {};  // differences of the plane's values at adjacent corners, by axis
   int32_t* rows_[3] = {};
   int32_t views_[3][2] = {};  // [axis][is above]
 };

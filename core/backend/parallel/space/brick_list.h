@@ -76,7 +76,7 @@ class BrickList {
   Space& space_;
   const int code_bits_;
   uint32_t size_ = 0;
-  bool sorted_ = true;  // ascending, no code twice
+  bool sorted_ = true;  // the codes ascend, and none occurs twice
   SpaceArray<Space, uint64_t> codes_, masks_;
 };
 

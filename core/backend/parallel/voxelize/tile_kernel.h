@@ -26,9 +26,9 @@ inline constexpr int kTileCodeBits =
 struct TileWave {
   CubePlace place;
   const FixedTriangle* triangles;
-  const uint64_t* codes;  // cells of the pairs, sorted by tile
+  const uint64_t* codes;  // codes of the pairs' cells, sorted by tile
   const uint32_t* pair_triangles;
-  const uint32_t* tile_starts;  // first pair of each tile
+  const uint32_t* tile_starts;  // index of the first pair of each tile
   uint32_t tile_count, pair_count, first_tile;
 
   // The output arrays have space for kTileBricks bricks per thread block. Each thread block writes
@@ -50,7 +50,7 @@ struct DrawTile : TileWave {
   struct Shared {
     uint64_t masks[kTileBricks + kThreads];  // indexed by slot()
     uint32_t counts[kThreads];               // non-empty bricks in each thread's run
-    uint32_t groups[kThreads / kGroup];      // sums over groups of threads
+    uint32_t groups[kThreads / kGroup];      // sums of `counts` over groups of threads
   };
   // Returns the index of a brick in `masks`. There is one word of padding after each thread's run
   // of bricks, so that neighboring threads use different banks of the shared memory.

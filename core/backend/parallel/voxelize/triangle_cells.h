@@ -59,7 +59,7 @@ struct TriangleOnLattice {
     int32_t a, b;
     int64_t constant;
   };
-  int32_t first[3], last[3];  // cells of the bounding box
+  int32_t first[3], last[3];  // range of the cells in the bounding box
   int64_t n[3];               // quarter normal
   int128 plane;               // n . (low - v) / 2^shift, floored; v is vertex 0
   int32_t remainder;          // 1 if the division for `plane` left a remainder

@@ -13,7 +13,7 @@ namespace {
 // the vector, and bit 4 the half of the vector.
 template <int D>
 struct ByteOrder {
-  alignas(32) int8_t column[2][32] = {};     // lower three bits of the column's number
+  alignas(32) int8_t column[2][32] = {};     // lower three bits of the voxel column's number
   alignas(32) int8_t height[4][2][32] = {};  // height above the floor of the first of four bricks
   alignas(32) int8_t depth[4][2][32] = {};   // distance below the highest voxel of the four bricks
   constexpr ByteOrder() {

@@ -30,7 +30,8 @@ namespace voxdag::cpu {
 namespace {
 
 constexpr int kHeightBits = 12;  // bits for the fraction of a voxel, in 16-bit lanes
-constexpr int kColumnBits = 40;  // bits for the fraction, in the 64-bit height of a column
+// Bits for the fraction of a voxel, in the 64-bit height of a column of bricks.
+constexpr int kColumnBits = 40;
 
 VOXDAG_INLINE __m256i load(const void* at) {
   return _mm256_load_si256(static_cast<const __m256i*>(at));
@@ -75,7 +76,7 @@ class Heights {
   // The place where the plane crosses the column of bricks (p, q).
   struct Column {
     int p, q;
-    int64_t from, to;  // range of bricks that the plane may touch; empty if from > to
+    int64_t from, to;  // range of bricks that the plane can touch; empty if from > to
     int brick;         // brick in which this column of bricks begins (see above)
     int within;        // y of the lowest voxel column, above the floor of `brick`, in lane units
   };

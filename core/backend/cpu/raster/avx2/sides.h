@@ -106,7 +106,7 @@ class Sides {
     }
   }
 
-  __m256i by_q_[16], by_p_[16];  // by row of bricks
+  __m256i by_q_[16], by_p_[16];  // bounds for each row of bricks
 };
 
 }  // namespace
