@@ -19,7 +19,7 @@ namespace {
 constexpr uint64_t kRows = 8'000'000;
 constexpr uint64_t kGiB = uint64_t{1} << 30;
 
-// For each number of runs, synthetic artifacts in a temporary folder. They are generated when they
+// Synthetic artifacts in a temporary folder, for each number of runs. They are generated when they
 // are first used.
 class Fixtures {
  public:

@@ -102,7 +102,7 @@ enum class Method {
 };
 
 // Creates a backend that runs the parallel pipeline (core/backend/parallel) on `threads` threads of
-// the host, for tests and comparisons. If `threads` is 0, uses one for each hardware thread.
+// the host, for tests and comparisons. If `threads` is 0, uses one thread for each hardware thread.
 std::unique_ptr<Backend> make_parallel_host_backend(Method method, unsigned threads = 1);
 
 // Returns the number of GPUs that make_cuda_backend() can open. Returns 0 if this build has no

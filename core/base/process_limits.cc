@@ -176,8 +176,8 @@ uint64_t default_memory() {
 }
 
 unsigned default_threads() {
-  // Computed once, because it reads up to a dozen files, and several commands declare the number as
-  // the default of an option.
+  // Computed once, because the computation reads up to a dozen files, and several commands declare
+  // the number as the default of an option.
   static const auto threads = [] {
     const unsigned cpus = std::max(1u, std::thread::hardware_concurrency());
     return static_cast<unsigned>(

@@ -15,8 +15,8 @@ class FramedMapping {
  public:
   // Maps the bytes [0, tail_offset) of the file. Copies `head` to the mapping's begin, and `tail`
   // to its byte `tail_offset`, which must not be less than the size of `head`. Throws Error:
-  // kNotFound, kCorrupt if the file is shorter than `tail_offset`, kInvalidInput if `path` is a
-  // symbolic link or no regular file.
+  // kNotFound, kCorrupt if the file is shorter than `tail_offset`, kInvalidInput if `path` is not a
+  // regular file, for example a symbolic link.
   FramedMapping(const std::string& path, std::span<const std::byte> head, uint64_t tail_offset,
                 std::span<const std::byte> tail);
   ~FramedMapping();

@@ -82,8 +82,8 @@ void PendingArtifacts::reset() {
 }
 
 void PendingArtifacts::survey(std::span<const ArtifactRef> refs) {
-  // First surveys with `wide` = false, which is right if no level of the output has more than
-  // narrow_words_ words. No level has more if all rows together have at most narrow_words_ words. A
+  // First surveys with `wide` = false. This is right if no level of the output has more than
+  // narrow_words_ words. That is certain if all rows together have at most narrow_words_ words. A
   // row has at most nine words; the division by 10 also covers the few rows of the top tree.
   ArtifactSurvey found = survey_artifacts(refs, open_, inputs_.shape, false);
   if (found.rows > narrow_words_ / 10) found = survey_artifacts(refs, open_, inputs_.shape, true);

@@ -6,7 +6,7 @@
 namespace voxdag::cpu {
 namespace {
 
-// Max triangles of a tile for which the plane memo may be faster than drawing.
+// Max triangles of a tile for which the plane memo can be faster than drawing.
 constexpr size_t kFewTriangles = 4;
 
 LatticeCube box_of(const SubvolumeTask& task) { return lattice_cube(task.cube, task.grid_levels); }

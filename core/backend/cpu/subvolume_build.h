@@ -72,7 +72,7 @@ class SubvolumeBuild {
   // entries_[first, first + count).
   ChildEntries push_children(const LatticeCube& cube, size_t first, size_t count);
   // True if splitting a cube of at most tile size is likely to be faster than drawing it, because
-  // the nodes of its parts may be in the plane memo.
+  // the nodes of its parts can be in the plane memo.
   bool is_worth_splitting(int size_log2, size_t first, size_t count);
   NodeRef build_tile(int size_log2, const LatticeCube& cube, size_t first, size_t count);
   Octants test_octants(Entry entry, const LatticeCube& cube) const;

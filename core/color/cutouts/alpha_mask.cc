@@ -9,7 +9,7 @@ AlphaMask::AlphaMask(uint32_t width, uint32_t height, MemoryBudget& budget) {
   for (;;) {
     const uint32_t row_words = (width + 63) / 64;
     const size_t bits = size_t{row_words} * height;
-    // A texel of the finest level needs one bit, a block of a coarser level two.
+    // A texel of the finest level needs one bit, and a block of a coarser level needs two.
     const bool is_finest = levels_.empty();
     levels_.push_back({width, height, row_words, words, is_finest ? words : words + bits});
     words += is_finest ? bits : 2 * bits;

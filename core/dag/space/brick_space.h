@@ -54,8 +54,8 @@ constexpr uint64_t brick_neighbors(uint64_t mask) {
   return out;
 }
 
-// Returns the voxels of `empty` that are reached from voxels of `seed` by steps between 6-neighbors
-// within `empty`.
+// Returns the voxels of `empty` that a path of 6-neighbors within `empty` connects to a voxel of
+// `seed`.
 constexpr uint64_t brick_flood(uint64_t seed, uint64_t empty) {
   uint64_t reached = seed & empty;
   while (true) {

@@ -42,8 +42,8 @@ using CubeNeighbors = std::array<NodePlace, 8>;
 int smallest_filtered(uint32_t radius);
 
 // Returns a mask of the octants that the functions below read from a node of neighbor `n`: the
-// octants near the cube. From nodes with an edge of at most 2^smallest_filtered(), they read all
-// octants. `is_higher` is true if the neighbors have larger coordinates than the cube.
+// octants near the cube. From nodes with an edge of at most 2^smallest_filtered(), the functions
+// read all octants. `is_higher` is true if the neighbors have larger coordinates than the cube.
 uint8_t octants_near(int n, bool is_higher);
 
 // Adds a sub-DAG whose voxels are the blocked positions in a cube of 2^size_log2 voxels per edge to

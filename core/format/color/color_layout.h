@@ -3,7 +3,8 @@
 //
 //   [tier 0] [tier 1] ... [tier table]            tier: [regions' data] [directory]
 //
-// voxdag_reader_colors.h includes no other headers of voxdag, so it repeats the numbers it needs.
+// The voxdag_reader headers include no other headers of voxdag, so they repeat the numbers that
+// they need.
 #pragma once
 
 #include <cstddef>

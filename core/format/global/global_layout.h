@@ -1,6 +1,6 @@
 // Offsets and sizes in the global file, as docs/format.md, "The global file", describes them.
-// voxdag_reader.h and voxdag_reader_colors.h include no other headers of voxdag, so they repeat the
-// numbers that they need.
+// The voxdag_reader headers include no other headers of voxdag, so they repeat the numbers that
+// they need.
 //
 //   [header page] [level L-2] [level L-3] ... [level 0] [attribute sections] [checksum table]
 //

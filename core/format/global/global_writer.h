@@ -117,10 +117,10 @@ class GlobalFileWriter {
   // Error{kLimit}, whose message names the level, if the level has more than 2^40 words.
   void end_level(const GlobalLevel& level);
 
-  // If the caller knows the sizes of all levels, these functions replace the four above.
-  // place_levels() determines the levels' offsets; `levels` begins with the bricks. Then
-  // write_placed() writes words of any level, each word once and in any order, and finish_placed()
-  // completes the levels. Such a file cannot be resumed.
+  // If the caller knows the sizes of all levels, the next three functions replace begin_level(),
+  // checksum_words(), write_words() and end_level(). place_levels() determines the levels' offsets;
+  // `levels` begins with the bricks. Then write_placed() writes words of any level, each word once
+  // and in any order, and finish_placed() completes the levels. Such a file cannot be resumed.
   void place_levels(std::span<const GlobalLevel> levels);
   void write_placed(uint32_t level, uint64_t first, std::span<const uint32_t> words);
   void finish_placed();

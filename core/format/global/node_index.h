@@ -40,9 +40,9 @@ class NodeIndex {
     uint64_t before = 0;  // number of nodes that begin before the 64 words
   };
 
-  // The functions of a NodeIndex that loops over many offsets call. They are always inlined, so
-  // that sources that are compiled for different instruction sets can call them. The index must
-  // outlive the Lookup.
+  // The functions of a NodeIndex for loops over many offsets. They are always inlined, so that
+  // sources that are compiled for different instruction sets can call them. The index must outlive
+  // the Lookup.
   struct Lookup {
     const Words* words = nullptr;  // null for bricks
     uint64_t word_count = 0;
@@ -64,7 +64,7 @@ class NodeIndex {
   NodeIndex() = default;
   // Walks the words of the level on up to `threads` threads. Throws Error{kCorrupt} unless every
   // child mask is 1 to 255, the last node ends with the level, and the level has as many nodes as
-  // the header says. The message begins with `where`. Reports to `pages`, if it is not null, the
+  // the header says. The message begins with `where`. If `pages` is not null, reports to it the
   // bytes that were read.
   NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
             MemoryBudget& budget, const CancelToken& cancel, const std::string& where,

@@ -42,7 +42,7 @@ struct SubtreeWords {
   bool is_small = true;
 
   VOXDAG_INLINE uint32_t* node(uint64_t i) const { return words + (is_small ? 3 : 6) * i; }
-  // The two ends of the values can be in two cache lines.
+  // Prefetches both ends of the values, because they can be in two cache lines.
   VOXDAG_PREFETCH void prefetch(uint64_t i) const {
     __builtin_prefetch(node(i));
     __builtin_prefetch(node(i + 1) - 1);

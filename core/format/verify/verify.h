@@ -33,7 +33,7 @@ namespace voxdag {
 // Checks the file on up to `threads` threads. Throws Error{kCorrupt}; the message names the
 // problem, its place and the expected value. A level must be wide if and only if it has more than
 // `narrow_words` words. If `is_quick` is true and the nodes are in the order by first parent, does
-// not search for equal nodes. Reports to `pages`, if it is not null, the bytes that were read.
+// not search for equal nodes. If `pages` is not null, reports to it the bytes that were read.
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel,
                         uint64_t narrow_words = global_layout::kNarrowLevelWords,

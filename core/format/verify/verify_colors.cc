@@ -68,8 +68,8 @@ constexpr const char* kBrokenEntry =
     "a count of cells or the offset of its data is out of range: expected at most the cells of the "
     "region's cube, and data within the section";
 
-// Estimate of the bytes that a region reads. The nodes of its cells are at random places, and the
-// system loads up to 64 KiB at each of them.
+// Estimate of the bytes that are read to check a region. The nodes of its cells are at random
+// places, and the system loads up to 64 KiB at each of them.
 constexpr uint64_t kReadBytesPerRegion = uint64_t{1} << 20;
 
 class ColorVerifier {

@@ -26,8 +26,8 @@ class SolidFill {
 
   // For a tile of 64^3 voxels with a single triangle, which covers the tile (plane_views.h):
   // returns the inner sides (plane.h) of the triangle's plane. Returns nullopt if the tile needs
-  // begin_tile(), add() and fill_tile(). If the tile's node can be made with these sides, call
-  // pass_plane() with the number of filled voxels. `f` and `is_turned` are as for
+  // begin_tile(), add(), finish_views() and fill(). If the tile's node can be made with these
+  // sides, call pass_plane() with the number of filled voxels. `f` and `is_turned` are as for
   // PlaneViews::read().
   std::optional<PlaneViews::Sides> read_plane(const Plane& plane, int64_t f, bool is_turned,
                                               const LatticeCube& tile);

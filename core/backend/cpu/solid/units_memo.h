@@ -1,8 +1,8 @@
 // A cache from voxel blocks (8^3 voxels) to the units of their empty voxels
 // (core/geometry/solid_rule.h). The units of a block depend only on its voxels. Most blocks of a
-// scene occur more than once, and a lookup is faster than a search for components. Only blocks with
-// one or two units are stored, and no blocks with blind units (solid_rule.h). Most blocks that
-// surfaces cross are of this kind.
+// scene occur more than once, and a lookup is faster than a search for components. The cache stores
+// only blocks that have one or two units, none of them blind (solid_rule.h). Most blocks that
+// surfaces cross are such blocks.
 //
 // The cache is direct-mapped: a new block replaces the block in its slot. All bytes of a block are
 // compared, so a hit is correct even if different blocks have the same key. When most lookups miss,

@@ -39,8 +39,8 @@ struct Layers {
 };
 constexpr Layers kLayers;
 
-// Columns of bricks, numbered p + 16 q. All rows are in one list, because the CPU would mispredict
-// the length of a separate loop for each row.
+// Columns of bricks, numbered p + 16 q. The columns of all rows are in one list, because the CPU
+// would mispredict the length of a separate loop for each row.
 struct ColumnList {
   int count = 0;
   uint8_t numbers[256 + 16];  // 16 spare elements, because add() always writes 16 numbers
