@@ -32,8 +32,7 @@ bool is_reader_gone() {
   return poll(&output, 1, 0) > 0 && (output.revents & POLLERR) != 0;
 }
 
-// Ends the process by SIGPIPE, without a message, as a program ends that does not handle this
-// signal.
+// Ends the process by SIGPIPE, without a message, like a program that does not handle this signal.
 [[noreturn]] void end_by_closed_pipe() {
   std::signal(SIGPIPE, SIG_DFL);
   std::raise(SIGPIPE);

@@ -26,7 +26,7 @@ size_t edit_distance(const std::string& a, const std::string& b) {
   return rows.back().back();
 }
 
-// Returns the number of characters without leading dashes.
+// Returns the number of characters of a word, not counting leading dashes.
 size_t length_of(const std::string& word) {
   return word.size() - std::min(word.find_first_not_of('-'), word.size());
 }

@@ -429,11 +429,11 @@ class CombinedColors {
   std::unique_ptr<const ResidentPages> pages_;
   uint32_t levels_ = 0;
   std::vector<std::string> names_;
-  // By source and by index in the source's list of materials: the index in names_. Empty if there
-  // is only one source.
+  // indices_[s][i] is the index in names_ of material i of source s. Empty if there is only one
+  // source.
   std::vector<std::vector<uint32_t>> indices_;
-  // By tier, for the regions of the tier that are not complete: the regions below them. The key is
-  // the code of the region.
+  // below_[tier] has an entry for each region of the tier that is not complete: the counts of the
+  // regions below it. The key is the code of the region.
   std::vector<std::map<uint64_t, Below>> below_;
 };
 

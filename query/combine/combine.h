@@ -47,7 +47,7 @@ struct CombineSpec {
   bool replace = false;  // replace an existing file
   // If false, the new file has no attributes.
   bool attributes = true;
-  // If only one of the files has colors, the color of the cells in which this file has no voxel.
+  // Used if only one of the files has colors: the color of cells in which that file has no voxel.
   std::optional<voxdag_reader::Rgb> fill_color;
   uint64_t memory_bytes = uint64_t{1} << 30;
   // Threads that encode attributes. With 2 or more, the digest is computed while the file is read
@@ -76,13 +76,15 @@ struct CombineReport {
 // Writes the result to spec.output, which gets its final name when it is complete. Temporary files
 // are in a folder next to the output; combine() removes the folder at the end, also after an error.
 // If the process is killed, the next combine with the same output removes the folder. Throws Error:
-// - kInvalidInput if the files have different grids (with spec.offset: different edges of a voxel)
-//   or different hash bits, if a file has another node order than the order by hash (with
-//   spec.offset, the second file can have any order), if moved voxels are outside of the grid and
-//   spec.clip is false, or if the operation needs an attribute that only one file has
-//   (docs/extract.md);
-// - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled; and the errors of
-//   LockedOutputs.
+// - kInvalidInput in these cases:
+//   - The files have different grids. With spec.offset, only the edge of a voxel must be the same.
+//   - The files have different hash bits.
+//   - The nodes of a file are not in the order by hash. With spec.offset, only the first file must
+//     have this order.
+//   - Moved voxels are outside of the grid, and spec.clip is false.
+//   - The operation needs an attribute that only one file has (docs/extract.md).
+// - kCorrupt for a damaged file; kNoSpace, kOutOfMemory, kCanceled.
+// - The errors of LockedOutputs.
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel);

@@ -56,7 +56,7 @@ class KeptCursor {
     cursor_->next();
     hashes_.pop();
   }
-  // Moves to the next kept node, unless the current node is kept. Then loads the node's row.
+  // Moves to the next kept node, unless the current node is kept. Loads the row of the kept node.
   void find() {
     while (!cursor_->at_end() && !bits_.has(cursor_->offset())) step();
     if (!cursor_->at_end()) load();

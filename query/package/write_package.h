@@ -50,8 +50,8 @@ struct PackageReport {
   std::string digest;
 };
 
-// Returns the files of the viewer: index.html, and files whose names contain the hash of their
-// contents.
+// A function that returns the files of the viewer: index.html, and files whose names contain the
+// hash of their contents.
 using ViewerMaker = std::function<std::vector<ViewerFile>()>;
 
 // Writes the package. Calls `make_viewer` only after it has checked and locked the output folder,

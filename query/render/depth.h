@@ -18,7 +18,8 @@ struct DepthMap {
   std::vector<float> depths;
 };
 
-// If the grid has no voxels, all distances are infinite. Throws the errors of render_picture().
+// Computes the depth map of a view. If the grid has no voxels, all distances are infinite. Throws
+// the errors of render_picture().
 DepthMap render_depth(const DagView& dag, const Placement& placement, int width, int height,
                       unsigned threads, const CancelToken& cancel);
 

@@ -92,10 +92,10 @@ double Lighting::floor_light(const Ray& ray, const Sampler& sampler) const {
   return 1 - fade * (0.75 - 0.35 * open - 0.40 * (sees(s, sun_) ? 1 : 0));
 }
 
-// Sets the direction of the sun. If there is a floor, the camera is outside the scene, and the sun
-// is placed behind the camera's left shoulder. Otherwise, tries 48 positions: 16 directions around
-// the vertical, each at three heights. Chooses the position where the lit share of the samples in
-// `seen` is nearest to kLitTarget.
+// Sets the direction of the sun. If there is a floor, places the sun behind the camera's left
+// shoulder. (A floor exists only if the camera is outside the scene.) Otherwise, tries 48
+// positions: 16 directions around the vertical, each at three heights. Chooses the position where
+// the lit share of the samples in `seen` is nearest to kLitTarget.
 void Lighting::place_sun(const std::vector<SurfaceHit>& seen, const Vec& back) {
   constexpr int kTurns = 16, kHeights = 3;
   constexpr double kLitTarget = 0.35;

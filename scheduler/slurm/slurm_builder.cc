@@ -35,7 +35,7 @@ class SlurmBuilder : public ClusterBuilder {
   explicit SlurmBuilder(BuildJob& job) : job_(job), cluster_(job) {}
 
   // Continues an earlier run. The unfinished batches of that run remain open. Accepts completion
-  // records that its tasks wrote after it ended.
+  // records that the tasks of that run wrote after the run had ended.
   void resume(const std::string& scene_digest) override;
   // Cuts the triangles of `planned` into batches. Then waits until all batches are built, unless a
   // merge job will wait for them. Throws Error with the reason of the last failure if a batch has

@@ -145,7 +145,7 @@ class JobStore {
 
   std::optional<StoredMerge> merge();
   void save_merge(uint32_t level, std::span<const std::byte> state);
-  // Forgets the state of the merge and its result.
+  // Removes the state of the merge and the result that record_result() stored.
   void forget_merge();
   void record_result(const JobResult& result);
   std::optional<JobResult> result();

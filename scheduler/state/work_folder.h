@@ -39,7 +39,7 @@ class WorkFolder {
   std::string spill_path() const { return path_ + "/triangles.vdspill"; }
   // File for the decoded geometry of a compressed scene.
   static std::string decoded_path(const std::string& folder) { return folder + "/decoded.vdspill"; }
-  // Triangles that outlive a run.
+  // Triangles, kept for later runs.
   std::string durable_path() const { return path_ + "/triangles.vddurable"; }
   // The sample rows of a solid.
   std::string rows_path() const { return path_ + "/rows.vddurable"; }
@@ -51,7 +51,7 @@ class WorkFolder {
   std::string closed_path() const { return path_ + "/closed.vddurable"; }
   // The components at the faces of an enclosed solid's parts.
   std::string faces_path() const { return path_ + "/faces.vdspill"; }
-  // Colors of cubes that outlive a run.
+  // Colors of cubes of the color grid, kept for later runs.
   std::string colors_path() const { return path_ + "/colors.vddurable"; }
   // The merge's levels in a build that reorders them. The file has the name with ".partial" added.
   std::string merged_path() const { return path_ + "/merged.vdag"; }
@@ -96,7 +96,7 @@ class WorkFolder {
   }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
-  // Removes the frame of the levels. Errors are ignored.
+  // Removes the frame of the levels (frame_path()). Errors are ignored.
   void remove_frame() { remove_silently(frame_path()); }
   // Removes the levels of a build that reorders them, and the frame. Errors are ignored.
   void remove_merged() {

@@ -66,7 +66,8 @@ class BandTile {
   std::vector<uint16_t> from_, to_;
 };
 
-// Returns the contents of a box of cells in the grid of 2^grid_levels cells per edge, at least 4.
+// Returns the contents of a box of cells in the grid of 2^grid_levels cells per edge. The grid must
+// have at least 4 cells per edge.
 BandTile::Contents contents_of(const DagView& dag, uint32_t grid_levels, const Region& box);
 
 // The implementation of for_each_band_part().

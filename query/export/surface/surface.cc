@@ -114,8 +114,8 @@ void Surface::find(std::span<const RowBrick> bricks, Direction direction, Export
   }
 }
 
-// Adds the rectangles of a slab. `next` is the next slab in the direction; it is empty if it has no
-// bricks.
+// Adds the rectangles of a slab (brick_rows.h) whose outer sides face `direction`. `next` is the
+// adjacent slab in this direction. If that slab has no bricks, `next` is empty.
 void Surface::add_slab(std::span<const RowBrick> slab, std::span<const RowBrick> next,
                        Direction direction, ExportStage& stage) {
   for (PlaneRow& plane : planes_) plane.v = -2;

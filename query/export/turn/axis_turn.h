@@ -12,7 +12,7 @@
 namespace voxdag::query {
 
 // A rotation. Axis a of the turned grid is axis from[a] of the file's grid. If reversed[a] is true,
-// its direction is reversed.
+// the two axes have opposite directions.
 struct AxisTurn {
   std::array<uint8_t, 3> from = {0, 1, 2};
   std::array<bool, 3> reversed = {};

@@ -36,8 +36,9 @@ struct BatchSubvolume {
   Cube cube;
   double weight = 0;
   uint64_t triangles = 0;
-  // Solids only: the state of the subvolume, and the extents of its views along x, y and z in the
-  // file of the rows (SolidRows::file()). The batch file stores no offsets.
+  // Only for solids: the state of the subvolume, and the extents of its views along x, y and z in
+  // the file of the rows (SolidRows::file()). The batch file stores only the sizes and checksums of
+  // the extents, not their offsets.
   SolidUnit unit = SolidUnit::kShell;
   std::vector<RowExtent> views;
 };

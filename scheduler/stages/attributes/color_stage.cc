@@ -81,8 +81,8 @@ struct BakeWorker {
   bool is_baked = false;       // baked in this run; otherwise its records are in the ColorStore
 };
 
-// Adds the regions in `records`, an artifact or a part of one, to a section. Returns the number of
-// their cells on the finest level.
+// Adds the regions in `records` to a section. `records` is an artifact (color_store.h) or a part of
+// an artifact. Returns the number of cells of these regions on the finest level.
 uint64_t add_regions(const ColorStore& artifacts, std::span<const std::byte> records,
                      AttributeSectionWriter& section) {
   RegionRecords regions(artifacts.path(), records);

@@ -20,7 +20,8 @@ struct ClusterPlan {
 // Returns the default number of tasks: about two minutes of one CPU each.
 uint64_t default_tasks(double expected_bricks, uint64_t subvolumes);
 
-// Plans a build with `tasks` tasks, or default_tasks() if it is 0; at most one per subvolume.
+// Plans a build with `tasks` tasks, or with default_tasks() if `tasks` is 0. The plan has at most
+// one task per subvolume.
 ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks);
 
 // Returns the estimate and the plan as one JSON object.

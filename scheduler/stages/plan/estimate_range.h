@@ -1,4 +1,4 @@
-// Arithmetic and JSON of estimates.
+// Arithmetic and JSON of estimates. An estimate has a low, a likely and a high number.
 #pragma once
 
 #include <algorithm>

@@ -23,8 +23,8 @@ class PilotTriangles {
                  const StageContext& context);
 
   bool is_complete() const { return is_complete_; }
-  // Streams the triangles on a grid that is again 2^shift times coarser. This object must outlive
-  // the stream.
+  // Streams the triangles on a grid that is 2^shift times coarser than the grid of this object. The
+  // object must outlive the stream.
   std::unique_ptr<TriangleStream> open(uint32_t shift) const;
   // CPU time of all threads.
   double cpu_s() const { return cpu_s_; }

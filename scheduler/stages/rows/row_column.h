@@ -35,7 +35,7 @@ struct TileGrid {
   int blocks;       // blocks along a tile's edge, at most 8
 };
 
-// The crossings outside the grid of the rows through a tile's square, including its border.
+// The sample rows through a tile's square or along its border: their crossings outside the grid.
 struct OutsideTile {
   int32_t before[81] = {};  // sums of the signs of the crossings in front of the grid
   int32_t total[81] = {};   // numbers (row_sums.h) of all crossings outside the grid

@@ -2,9 +2,11 @@
 // (core/geometry/solid_rule.h) from the low faces of the subvolumes, and the full cubes
 // (SolidRows::full_cubes).
 //
-//   1. Each subvolume: the crossings of its triangles with its own sample rows (RowSums).
-//   2. Each column of subvolumes along each axis (row_column.h): the totals of its rows, then the
-//      views at the low face of each subvolume, and at the corners of empty cubes.
+//   1. For each subvolume, it adds up the crossings of the subvolume's triangles with the
+//      subvolume's own sample rows (RowSums).
+//   2. For each column of subvolumes along each axis (row_column.h), it computes the totals of the
+//      column's rows. Then it computes the views from the low face of each subvolume, and from the
+//      corners of empty cubes.
 //
 // Durable output: SolidRows. Resume rule: rows that an earlier run saved are used. Otherwise all
 // subvolumes must have bins, which is true until the first one is built.
