@@ -139,7 +139,7 @@ def check_late_sun(visitor, url, camera):
     )
 
 
-# Draws and picks as soon as the context is restored, before programs and tiles are.
+# Draws and picks as soon as the context is restored, before programs and tiles are restored.
 LOSE = """() => {
   const {viewer, renderer} = voxdagViewer;
   window.lost = {

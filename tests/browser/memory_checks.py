@@ -34,8 +34,8 @@ MANY_TILES = """async ([budgetBytes, maxFailures, first, all]) => {
       return nodes.map(({level}) => tile(level));
     }
   };
-  // Counts everything reachable: the members of objects and maps, and the elements of arrays. Words
-  // count as before.
+  // Counts everything reachable: the members of objects and maps, and the elements of arrays. 64
+  // bytes of a typed array count as one.
   const count = (root) => {
     const seen = new Set([root]), todo = [root];
     let things = 0;

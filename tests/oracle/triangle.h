@@ -14,7 +14,7 @@
 namespace oracle {
 
 constexpr int64_t kUnits = 256;                      // lattice units per voxel
-constexpr int64_t kWidest = (int64_t{1} << 40) - 1;  // largest coordinate a triangle may have
+constexpr int64_t kWidest = (int64_t{1} << 40) - 1;  // largest coordinate of a triangle
 
 using Point = std::array<int64_t, 3>;  // x, y, z
 using Triangle = std::array<Point, 3>;

@@ -107,7 +107,7 @@ inline std::vector<Cube> mixed_cubes(uint64_t seed, uint32_t deepest) {
 
 class MergeHarness {
  public:
-  // Levels of over `narrow_words` words are wide.
+  // A level of more than `narrow_words` words is wide: pointers to its nodes have 64 bits.
   MergeHarness(uint32_t grid_levels, uint32_t hash_bits, uint64_t narrow_words = uint64_t{1} << 32)
       : grid_levels_(grid_levels),
         hash_bits_(hash_bits),

@@ -128,7 +128,8 @@ TEST(TextPoints, Colors) {
   EXPECT_THAT(message_of("1 2 3 0 0 0\n4 5 6 1 2 red\n"), HasSubstr("\"red\" in column 6 (b)"));
 }
 
-// Any range of rows can be read, in a file with many blocks of rows and several windows.
+// Any range of rows can be read, in a file with many blocks of rows that is read through several
+// windows (file_window.h).
 TEST(TextPoints, ManyRowsFromAnyRowOn) {
   std::string file = "x,y,z\n";
   for (int i = 0; i < 40000; ++i) {

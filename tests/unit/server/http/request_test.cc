@@ -232,7 +232,7 @@ TEST(Exchange, RejectsMalformedChunks) {
 }
 
 // The lines before chunks and the trailer fields have a total limit of bytes. The chunks themselves
-// may be small and many.
+// can be small and many.
 TEST(HostileRequests, LinesOfChunksAreBounded) {
   const std::string endless(32768, '0');
   std::string extensions, trailers;
@@ -319,7 +319,8 @@ TEST(Exchange, TimesOut) {
   EXPECT_EQ(idle.next_request(), 0);
 }
 
-// A client that sent many bytes at first may then not be silent for longer than other clients.
+// If a client falls silent within a body, the connection ends after the usual time, even if the
+// client sent many bytes at first.
 TEST(HostileRequests, PastBytesDoNotExcuseSilence) {
   Client client(put("Content-Length: 1000000\r\n", std::string(100000, 'x')), true);
   ASSERT_EQ(client.next_request(), 200);
