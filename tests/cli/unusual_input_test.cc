@@ -51,7 +51,7 @@ TEST_F(UnusualInput, ControlCharactersOfNamesAreNotPrinted) {
 
 constexpr const char* kReplacement = "\xef\xbf\xbd";  // U+FFFD, for a byte that is not UTF-8
 
-// A path may have bytes that are not UTF-8. The created file has exactly this name. In JSON, U+FFFD
+// A path can have bytes that are not UTF-8. The created file has exactly this name. In JSON, U+FFFD
 // replaces such bytes, because JSON must be UTF-8.
 TEST_F(UnusualInput, PathsNeedNotBeUtf8) {
   build();

@@ -1,5 +1,5 @@
-// A hash table may store only the upper 32 bits of a hash. Different nodes whose hashes have equal
-// upper 32 bits must remain different nodes.
+// The hash table of a backend can store only the upper 32 bits of a hash. Different nodes whose
+// hashes have equal upper 32 bits must remain different nodes.
 #include <unordered_map>
 
 #include "tests/conformance/harness.h"

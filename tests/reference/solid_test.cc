@@ -34,8 +34,8 @@ void for_each_solid(Visit visit) {
 
 using SolidBuilds = Reference;
 
-// Builds have the oracle's voxels and counts of the solid. The solid may extend beyond the grid;
-// the triangles outside also affect which voxels are inside.
+// Builds have the oracle's voxels and counts of the solid. The solid can extend beyond the grid.
+// The triangles outside the grid also affect which voxels are inside the solid.
 TEST_F(SolidBuilds, EqualTheOracle) {
   for_each_solid([&](oracle::SolidKind kind) {
     for (const int edge : {4, 8, 16, 32})
@@ -155,8 +155,8 @@ TEST_F(SolidBuilds, CubesInABoxAreFull) {
   EXPECT_EQ(run(spec).merge.voxels, 800u * 800 * 800);
 }
 
-// Each defect of a surface gives its own warning in the report, if the rule of the solid is
-// affected by the defect.
+// The report has a separate warning for each defect of a surface, if this defect affects the rule
+// of the solid.
 TEST_F(SolidBuilds, Warnings) {
   const auto code = [&](const Triangles& scene, SolidName rule) -> std::string {
     BuildSpec spec = spec_for(scene, 64);

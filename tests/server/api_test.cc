@@ -311,7 +311,7 @@ TEST_F(Api, NamesNoFolderOfItsMachine) {
   const std::string work = config_.data_folder + "/jobs/" + id + "/work";
   ASSERT_TRUE(until([&] { return std::filesystem::exists(work + "/lock"); }));
   post("/api/v1/jobs/" + id + "/suspend");
-  // The job's process may still write files, so the test waits until the process has ended.
+  // The job's process can still write files, so the test waits until the process has ended.
   ASSERT_TRUE(until([&] {
     return http_->get("/metrics").body.find("voxdag_job_processes 0") != std::string::npos;
   }));

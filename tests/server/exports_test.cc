@@ -275,9 +275,9 @@ TEST_F(ServiceExports, KeepTheirOrderAfterARestart) {
   }
 }
 
-// After a kill, the record says that the export runs, and a part of its file may exist. The next
-// service removes the part and runs the export again. If exports end the service again and again,
-// they fail.
+// After a kill, the record of the export has the state "running", and a part of its file can exist.
+// The next service removes the part and runs the export again. If the service ends during an export
+// too often, the export fails.
 TEST_F(ServiceExports, RunAgainAfterAKill) {
   start();
   const std::string id = finished_job();

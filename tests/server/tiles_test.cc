@@ -343,7 +343,7 @@ TEST_F(View, ATruncatedFileIsAnErrorAndNoCrash) {
   try {
     query::encode_tile(file.dag(), kTileLevels, {0, 0});
   } catch (const Error&) {
-    // This error may occur. Otherwise encode_tile() has made a tile from the zeros that replace the
+    // This error can occur. Otherwise encode_tile() has made a tile from the zeros that replace the
     // missing bytes.
   }
   EXPECT_THROW(file.expect_readable(), Error);

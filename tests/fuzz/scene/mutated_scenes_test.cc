@@ -15,8 +15,8 @@
 namespace voxdag::test {
 namespace {
 
-// Limits the time of a test: scenes that declare more triangles are opened but not read. A mutation
-// may declare a huge number of instances.
+// Limits the time of a test. If a scene declares more triangles, the test opens it but does not
+// read its triangles. A mutation can make a scene declare a huge number of instances.
 constexpr uint64_t kMaxTriangles = 200000;
 
 // Changes the file one to eight times: changes a byte to a random byte, to a digit or to another

@@ -1,6 +1,6 @@
-// Decodes a frame of an artifact. The first byte of the input selects bricks or nodes, and the
-// number of hash bits. The next four bytes give the numbers of rows and children, which an artifact
-// stores in its index. The rest is the frame.
+// Decodes a frame of an artifact (a compressed block of rows of one level). The first byte of the
+// input selects bricks or nodes, and the number of hash bits. The next four bytes give the numbers
+// of rows and children, which an artifact stores in its index. The rest is the frame.
 #include "core/dag/sub_dag.h"
 #include "core/format/artifact/artifact.h"
 #include "core/format/artifact/frame_codec.h"

@@ -107,8 +107,8 @@ TEST(AddedOption, IsAPythonKeyword) {
   EXPECT_THAT(writer.members, HasSubstr("    backend: Optional[Literal[\"auto\", \"cpu\""));
 }
 
-// Expects that the public C++ header has a member for each option. The member's name may end with a
-// unit or a kind, such as cache_bytes.
+// Expects that the public C++ header has a member for each option. The member's name can have a
+// unit or a kind at its end, as in cache_bytes.
 struct MemberFinder {
   template <class T>
   void operator()(const Field& field, T&) {

@@ -81,8 +81,8 @@ TEST(Merge, EqualSubDagsInDifferentOctantsKeepTheirPlaces) {
   const auto blob = [&](int x, int y, int z) {
     for (int i = 0; i < 4; ++i) voxels.set(x + i, y + i % 2, z);
   };
-  // The blob's brick is child 0 of its 8-voxel cube in one parent and child 7 in the other. These
-  // parents are octants 0 and 5 of their 16-voxel cubes.
+  // The brick of the blob is child 0 of one cube of 8 voxels per edge, and child 7 of another.
+  // These two cubes are octants 0 and 5 of their cubes of 16 voxels per edge.
   blob(0, 0, 0);
   blob(16 + 8 + 4, 16 + 4, 16 + 8 + 4);
   for (const uint32_t hash_bits : {4u, 64u})

@@ -64,7 +64,7 @@ TEST_P(WideLevels, SeveralPasses) { merge(noise_voxels(2, 256), equal_cubes(3), 
 // With 4 hash bits, many rows have equal hashes. The heap merge (heap_merge.h) merges these rows.
 TEST_P(WideLevels, EqualHashes) { merge(noise_voxels(3, 256), equal_cubes(3), 4, {24, 16}); }
 
-// There is one run, and its position map does not fit in the memory of a worker.
+// The merge has only one run. Its position map does not fit in the memory of a worker.
 TEST_P(WideLevels, WindowsOfAMap) { merge(noise_voxels(4, 256), {Cube{}}, 64, {9}); }
 
 INSTANTIATE_TEST_SUITE_P(NarrowWords, WideLevels, testing::Values(64, 500'000),

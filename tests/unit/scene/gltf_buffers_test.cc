@@ -73,7 +73,7 @@ TEST(GltfBuffers, ExternalThatIsReplacedWhileTheSceneIsRead) {
       << error.message();
 }
 
-// A buffer that is not needed for triangles (here it has normals) may be missing.
+// A buffer that is not needed for triangles (here it has normals) can be missing.
 TEST(GltfBuffers, ExternalThatIsNotRead) {
   SceneBuilder scene = one_triangle();
   scene.root["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 36}});
@@ -233,7 +233,8 @@ TEST(GltfBuffers, LongDataUri) {
   }
 }
 
-// JSON may write base64's own characters as escapes, as some exporters do.
+// In the JSON, the base64 characters of a data: URI can be written as escapes, as some exporters
+// do.
 TEST(GltfBuffers, DataUriWithJsonEscapes) {
   SceneBuilder scene = one_triangle();
   for (int i = 0; i < 10000; ++i) scene.bin += static_cast<char>(i * i % 251);

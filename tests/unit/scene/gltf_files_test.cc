@@ -59,8 +59,8 @@ std::string glb_with_chunks(std::string json,
   return "glTF" + little_endian(2) + little_endian(static_cast<uint32_t>(12 + body.size())) + body;
 }
 
-// Chunks of unknown types may be anywhere after the JSON. Up to seven zeros or blanks after the
-// last chunk are padding; other bytes there are an error.
+// Chunks of unknown types can be anywhere after the JSON. Up to seven zeros or blanks after the
+// last chunk are padding. Other bytes there are an error.
 TEST(GltfContainer, OtherChunks) {
   SceneBuilder scene = one_triangle();
   scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
@@ -72,7 +72,7 @@ TEST(GltfContainer, OtherChunks) {
           glb_with_chunks(json, {{"XTRA", ""}, {"MORE", "1"}, {bin_type, bin}, {"LAST", "x"}}))
           .size(),
       1u);
-  // The header of the JSON chunk may give its length without the padding.
+  // The header of the JSON chunk can give its length without the padding.
   const std::string padded = json + std::string(4 - json.size() % 4, ' ');
   std::string glb = glb_with_chunks(padded, {{bin_type, bin}});
   put_u32(glb, 12, static_cast<uint32_t>(json.size()));
@@ -88,7 +88,7 @@ TEST(GltfContainer, OtherChunks) {
   EXPECT_NE(error_of_file(cut).message().find("inside the header of a chunk"), std::string::npos);
 }
 
-// The JSON may begin with a byte order mark, and end with zeros or white space.
+// The JSON can begin with a byte order mark, and end with zeros or white space.
 TEST(GltfContainer, PaddedJson) {
   SceneBuilder scene = one_triangle();
   scene.root["buffers"] = {{{"byteLength", scene.bin.size()}}};
@@ -150,7 +150,7 @@ TEST(GltfNumbers, NotFiniteAcrossWindows) {
   }
 }
 
-// Integers may be written with a point or an exponent, like 36.0 and 3.6e1.
+// Integers can be written with a point or an exponent, like 36.0 and 3.6e1.
 TEST(GltfNumbers, WholeNumbersWithPoints) {
   SceneBuilder scene = textured(std::string());
   scene.root["images"] = {{{"bufferView", 0}}};

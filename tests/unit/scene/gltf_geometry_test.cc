@@ -232,7 +232,8 @@ TEST(GltfGeometry, QuantizedPositions) {
   EXPECT_EQ(first_corner(u16, kU16, false), (Point{65535, 1, 0}));
 }
 
-// Points and lines make no triangles, which a warning reports. Their vertices may have any values.
+// Points and lines give no triangles, and a warning reports them. Their vertices can have any
+// values, because they are not read.
 TEST(GltfGeometry, PointsAndLinesAreNamedInAWarning) {
   SceneBuilder scene = one_triangle();
   const int positions = scene.add_positions({50, 50, 50, 60, 60, 60, 70, 70, 70});

@@ -263,8 +263,8 @@ TEST(Ply, FilesOfBothFormatsAreOneScene) {
   EXPECT_EQ(scene->files()[3].path, "c");
 }
 
-// A file that is truncated anywhere is refused. In ASCII files, only the last line end may be
-// missing.
+// A file that is truncated anywhere is refused. The exception is an ASCII file in which only the
+// last line end is missing.
 TEST(Ply, TruncatedFilesAreRefused) {
   for (const PlyFormat format : kFormats) {
     const std::string whole = plain_triangle(format);

@@ -31,7 +31,7 @@ TEST_F(CgroupTest, WalksUpInVersion2) {
   EXPECT_EQ(cgroup_memory("0::/slice/box\n", mount()), 3000000000u);
   write("slice/box/memory.max", "2000000000\n");
   EXPECT_EQ(cgroup_memory("0::/slice/box\n", mount()), 2000000000u);
-  // In a container, the path of the process's group may be "/", or a path that the container cannot
+  // In a container, the path of the process's group can be "/", or a path that the container cannot
   // see. Then the limit of the mounted root applies.
   EXPECT_EQ(cgroup_memory("0::/\n", mount()), UINT64_MAX);
   write("memory.max", "500000000\n");
@@ -49,7 +49,7 @@ TEST_F(CgroupTest, CpuQuotas) {
   write("slice/box/cpu.max", "1000 100000\n");
   EXPECT_EQ(cgroup_cpus("0::/slice/box\n", mount()), 1u);
   EXPECT_EQ(cgroup_cpus("", mount()), UINT64_MAX);
-  // In cgroup version 1, two controllers may be mounted in one folder.
+  // In cgroup version 1, two controllers can be mounted in one folder.
   write("cpu,cpuacct/pool/cpu.cfs_quota_us", "-1\n");
   write("cpu,cpuacct/pool/cpu.cfs_period_us", "100000\n");
   EXPECT_EQ(cgroup_cpus("4:cpu,cpuacct:/pool\n", mount()), UINT64_MAX);

@@ -245,8 +245,8 @@ TEST_F(ColorQuality, OfTextures) {
   }
 }
 
-// At the border of an image, the coarser levels of its pyramid are less sharp than the image, so
-// the bounds are lower.
+// At the border of an image, the coarser levels of its pyramid (mipmaps) are less sharp than the
+// image, so the required signal-to-noise ratios are lower.
 TEST_F(ColorQuality, OfBorders) {
   for (const Wrap wrap : {Wrap::kClampToEdge, Wrap::kMirroredRepeat}) {
     Material material = textured();

@@ -317,7 +317,8 @@ TEST_F(CombineColors, MemoryAndThreadsDoNotMatter) {
   EXPECT_TRUE(bytes("one") == bytes("many"));
 }
 
-// Alpha, normals and materials have the values of a where a has a voxel, and otherwise those of b.
+// Where a has a voxel, alpha, normals and materials have the values of a. Elsewhere they have the
+// values of b.
 TEST_F(CombineColors, OtherAttributes) {
   constexpr size_t kMaterials[2] = {7, 300};
   for (const auto& [color_a, color_b] : {std::pair{8u, 8u}, {7u, 6u}}) {

@@ -121,7 +121,7 @@ TEST_F(Combine, LittleMemory) {
   }
 }
 
-// Inputs and results can have levels with wide (64-bit) pointers.
+// Inputs and results can have wide levels (levels to which pointers have 64 bits).
 TEST_F(Combine, WideLevels) {
   const auto [a, b] = scenes(300, 64);
   const uint64_t narrow_words = 64;

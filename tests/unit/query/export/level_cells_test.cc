@@ -14,8 +14,8 @@ constexpr uint64_t kNoLimit = ~uint64_t{0};
 
 class LevelCellsTest : public testing::TestWithParam<uint64_t> {
  protected:
-  // Writes a file with random voxels. Levels of more than GetParam() words have wide (64-bit)
-  // pointers.
+  // Writes a file with random voxels. Pointers to a level of more than GetParam() words have 64
+  // bits.
   void write(uint64_t seed) {
     const oracle::Voxels voxels = random_voxels(seed, 1 << kCellLevels);
     write_global(path_, oracle::build_dag(voxels, 64), grid_of(1 << kCellLevels), 64, GetParam());

@@ -166,7 +166,8 @@ TEST_F(LevelSetTest, DistancesEqualTheOracle) {
   expect_right({2, whole_grid(2)}, 3);
 }
 
-// A cube that consists of full bricks has a band, although no brick has both set and empty cells.
+// A cube that consists of full bricks has a narrow band (the cells near the surface), although no
+// brick has both set and empty cells.
 TEST_F(LevelSetTest, AlignedCubesHaveABand) {
   write(voxels_where(5, [](int x, int y, int z) { return x >= 8 && x < 24 && y >= 16 && z < 16; }));
   expect_right({5, whole_grid(5)}, 2);
@@ -196,8 +197,8 @@ TEST_F(LevelSetTest, ThinRegionsOfASolid) {
   EXPECT_FALSE(has_inside(*dag_, CancelToken{}));
 }
 
-// If the voxels are the cells whose centers are in a ball, all distances are within a voxel of the
-// distance to the sphere.
+// All cells whose centers are in a ball are set. Then each cell's distance in the level set differs
+// from its distance to the sphere by less than a voxel.
 TEST_F(LevelSetTest, ABallHasTheDistancesOfTheSphere) {
   constexpr double kCenter = 32.3, kRadius = 20.7;
   const auto distance = [](const Position& cell) {

@@ -65,9 +65,9 @@ TEST_F(Voxelize, ListAndTilesGiveTheOraclesBricks) {
   }
 }
 
-// A window is the capacity of a frame (PairExpansion) in pairs. With tiny windows, frames are
-// expanded in many slices, and voxels are packed into bricks many times, so that the brick list is
-// merged and grows in between. The bricks remain the same.
+// A window is the size of a frame: a buffer for the pairs of one level (pairs.h). With tiny
+// windows, the pairs of a frame are expanded in many slices, and voxels are packed into bricks many
+// times, so that the brick list is merged and grows in between. The bricks remain the same.
 TEST_F(Voxelize, TinyWindowsChangeNothing) {
   const auto scene = oracle::fixed(oracle::make_scene(oracle::SceneKind::kSoup, 2, region, 60));
   const uint32_t count = static_cast<uint32_t>(scene.size());

@@ -47,8 +47,9 @@ TEST_F(ArtifactTest, SubDagComesBack) {
   }
 }
 
-// Numbers of rows around the size of a frame, child indices of one, two and three bytes, and
-// columns that compress well or not are read back unchanged.
+// Artifacts are read back unchanged if the number of rows is near the size of a frame (a block of
+// rows that is compressed), if child indices have one, two or three bytes, and if columns compress
+// well or badly.
 TEST_F(ArtifactTest, FramesOfAllSizesComeBack) {
   SegmentWriter segment(system_files(), folder_.path(), 0, budget_);
   for (const size_t count : {1u, 2u, 255u, 4095u, 4096u, 4097u, 9000u, 70000u}) {
@@ -191,7 +192,8 @@ TEST_F(ArtifactTest, WriterRefusesBrokenRows) {
   EXPECT_THAT(refusal(bad, 16), HasSubstr("bits beyond the hash bits"));
 }
 
-// Two rows with equal hash and mask are ordered by their children, even if they are in two frames.
+// Two rows with equal hash and mask are ordered by their children, even if the rows are in two
+// frames.
 TEST_F(ArtifactTest, TiesAreOrderedByChildrenAcrossFrames) {
   SubDag dag = random_rows(1, 200, 9, 0, 64);
   SubDag::Nodes& nodes = dag.levels.emplace_back();
