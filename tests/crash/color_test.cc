@@ -1,5 +1,5 @@
-// A build with colors and all other attributes is killed, loses power, or its disk becomes full or
-// fails, at any disk operation. The next build gives the same bytes.
+// At any disk operation, a build with colors and all other attributes is killed or loses power, or
+// its disk becomes full or fails. The next build gives the same bytes.
 #include <array>
 #include <set>
 

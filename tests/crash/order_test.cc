@@ -1,5 +1,5 @@
-// A build that reorders its nodes is killed, loses power, or its disk becomes full or fails, at any
-// disk operation. The next build gives the same bytes.
+// At any disk operation, a build that reorders its nodes is killed or loses power, or its disk
+// becomes full or fails. The next build gives the same bytes.
 #include "tests/crash/crash_fixture.h"
 
 namespace crash {

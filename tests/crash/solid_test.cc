@@ -1,5 +1,5 @@
-// A build of a solid is killed, loses power, or its disk becomes full or fails, at any disk
-// operation. The next build gives the same bytes and the same report of the interior.
+// At any disk operation, a build of a solid is killed or loses power, or its disk becomes full or
+// fails. The next build gives the same bytes and the same report of the interior.
 #include "tests/crash/crash_fixture.h"
 
 namespace crash {

@@ -46,9 +46,9 @@ struct Surface {
 double srgb_to_linear(double encoded);
 double linear_to_srgb(double linear);
 
-// Returns the mean color in 8 bits, or nothing if the surfaces have no area in the cube, because
-// they touch it only in points or lines. Surfaces are weighted by area and alpha, or only by area
-// if all points are transparent. `points` is the number of samples.
+// Returns the mean color in 8 bits. Returns nullopt if the surfaces have no area in the cube,
+// because they touch it only in points or lines. Surfaces are weighted by area and alpha, or only
+// by area if all points are transparent. `points` is the number of samples.
 std::optional<std::array<uint8_t, 3>> mean_color(std::span<const Surface* const> surfaces,
                                                  const Point& low, int64_t edge, int points = 128);
 

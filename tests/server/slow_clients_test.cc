@@ -13,7 +13,7 @@ namespace {
 
 constexpr size_t kMaxConnections = 40;
 constexpr size_t kAttackers = 64;
-constexpr useconds_t kAttackBeginsUs = 1'500'000;  // connections can be evicted after a second
+constexpr useconds_t kAttackBeginsUs = 1'500'000;  // above kMinExchangeWaitS (connection_table.cc)
 
 class SlowClients : public RunningService {
  protected:

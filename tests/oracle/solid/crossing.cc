@@ -44,8 +44,8 @@ Number area(const Point& from, const Point& to, const Point& other, int b, int c
   return u[0] * w[1] - u[1] * w[0];
 }
 
-// Returns on which side of the edge from u to w the moved point p (crossing.h) is, in the
-// projection onto the axes b and c.
+// Projects the moved point p (crossing.h) and the edge from u to w onto the axes b and c. Returns
+// on which side of the edge the point is.
 int side_of_edge(const Point& u, const Point& w, const Point& p, int b, int c) {
   const Polynomial pb = moved(p, b) - u[b], pc = moved(p, c) - u[c];
   return (pc * (w[b] - u[b]) + pb * (u[c] - w[c])).sign();

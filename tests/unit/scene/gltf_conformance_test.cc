@@ -209,8 +209,8 @@ TEST_F(GltfConformance, Manifest) {
   EXPECT_EQ(refused, 18u);
 }
 
-// A file without scenes draws its root nodes. They have the same mesh as the set's other files, so
-// the triangles of c23 are expected.
+// A file without scenes draws its root nodes. Its mesh is the mesh of the set's other files, so the
+// expected triangles are those of the file c23.
 TEST_F(GltfConformance, WithoutScenes) {
   Opened opened(kScenes / "conformance" / "c22_no_scene.glb");
   expect_same_triangles(triangles_of(*opened.source),

@@ -107,8 +107,8 @@ TEST(UnknownFile, OtherTextsAreNotPoints) {
   EXPECT_EQ(error_of_text("MM,x,y,z\n9,1,2,3\n").message(), "");
 }
 
-// A file that begins with JSON, even after white space or a byte order mark, or with the signature
-// of a GLB is read as glTF.
+// A file is read as glTF if it begins with the signature of a GLB or with JSON. White space or a
+// byte order mark can precede the JSON.
 TEST(UnknownFile, JsonIsGltf) {
   for (const char* text : {"{", "[", "\n\t {", "\xef\xbb\xbf{", "glTF"})
     EXPECT_THAT(error_of_file(text).message(), testing::Not(HasSubstr("expected a scene")));

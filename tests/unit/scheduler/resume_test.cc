@@ -332,8 +332,8 @@ TEST_F(ResumeTest, NeedsAFolderToWriteIn) {
   EXPECT_FALSE(std::filesystem::exists(output() + ".partial"));
 }
 
-// A job store, or a job in it, of another version of voxdag is refused, and the error names the
-// version. With `restart`, the build starts over.
+// A job store of another version of voxdag is refused, and so is a job of another version in a job
+// store. The error names the version. With `restart`, the build starts over.
 TEST_F(ResumeTest, RefusesAJobOfAnotherVersion) {
   const std::string expected = build(spec()).sha256;
   for (const bool of_store : {true, false}) {

@@ -101,7 +101,8 @@ class CombineColors : public Combine {
   }
 
   // Returns the code of the cell of b's color grid from which the result's cell at `code` takes its
-  // color; nothing if b has no voxel in the cell. The result has cells of `edge` voxels.
+  // color. Returns nullopt if b has no voxel in the result's cell. The result has cells of `edge`
+  // voxels.
   std::optional<uint64_t> color_cell_of_b(uint64_t code, int64_t edge, const Position& offset) {
     const ColoredScene& b = scenes_[1];
     if (cells_of_b_.empty())

@@ -61,9 +61,9 @@ TEST_F(CombineErrors, DamagedInputs) {
   }
 }
 
-// A file whose levels have wrong words but correct checksums is refused. The wrong words are
-// pointers to the middle of a node, to the end of a level and beyond it, wrong child masks, empty
-// bricks, and words that put nodes in a wrong order.
+// A file whose levels have wrong words but correct checksums is refused. Tests pointers to the
+// middle of a node, to the end of a level and beyond it. Also tests wrong child masks, empty
+// bricks, and nodes in a wrong order.
 TEST_F(CombineErrors, HostileLevels) {
   const oracle::Dag dag = oracle::build_dag(random_voxels(7, 64), 64);
   const auto intact = level_words(dag);

@@ -156,8 +156,8 @@ TEST_F(ExportColors, ProgressIsReported) {
   }
 }
 
-// A model of a .vox file has at most 256 voxels per edge, so the export of a larger grid has a
-// model for each cube of 256 voxels per edge that has voxels.
+// A model of a .vox file has at most 256 voxels per edge. So a larger grid is divided into cubes of
+// 256 voxels per edge, and each cube that has voxels becomes a model.
 TEST_F(ExportColors, VoxHasAModelForEachPlace) {
   open(9, 9, patches(9), 4);
   const auto decoded = decode_vox(bytes_of("vox", {9, whole_grid(9)})[0], 512);

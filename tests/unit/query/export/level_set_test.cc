@@ -174,8 +174,8 @@ TEST_F(LevelSetTest, AlignedCubesHaveABand) {
   expect_right({5, {{9, 17, 1}, {22, 30, 15}}}, 2);  // cuts a full cube
 }
 
-// The level set of a region that is too thin for a cube of 3^3 set voxels has signs if the complete
-// file has an inside (narrow_band.h).
+// If the complete file has an inside (narrow_band.h), the level set of a region has negative
+// distances inside, even if the region is too thin to contain a cube of 3^3 set voxels.
 TEST_F(LevelSetTest, ThinRegionsOfASolid) {
   write(voxels_where(5, [](int x, int, int) { return x < 17; }));
   EXPECT_TRUE(has_inside(*dag_, CancelToken{}));

@@ -19,8 +19,8 @@ DepthMap depth_of(const VoxelScene& scene, unsigned threads) {
   return render_depth(dag, kFromTheFront, kWidth, kHeight, threads, CancelToken());
 }
 
-// Returns the distance at which the ray through the center of a pixel enters the cube from 6 to 10,
-// by intersecting the ray with the cube's six planes.
+// Returns the distance at which the ray through the center of a pixel enters the block, a cube from
+// 6 to 10 along each axis. Intersects the ray with the cube's six planes.
 double distance_to_block(int x, int y) {
   const double eye[3] = {8, 9, 24}, length = std::sqrt(1 + 16.0 * 16);
   const double tangent = std::tan(20 * std::acos(-1) / 180);

@@ -182,8 +182,8 @@ TEST_F(OrderDefects, DuplicateIsNamedUnlessQuick) {
       << verified();
 }
 
-// A wrong word in a level, with right checksums, never crashes reorder(), whatever the order of the
-// output and the memory.
+// One word of a level is wrong, and the checksums are right. reorder() does not crash, for both
+// orders of the output and for any memory.
 TEST_F(OrderDefects, HostileLevels) {
   const LevelWords intact = levels_;
   for (size_t l = 0; l < intact.size(); ++l)

@@ -296,8 +296,8 @@ TEST_F(Cluster, ATimeoutIsNoticedByTheNextRun) {
   EXPECT_NE(warnings_.text.find("TIMEOUT; it is split"), std::string::npos) << warnings_.text;
 }
 
-// Timeouts, after which a batch is split, and preemptions do not count as failures, so they do not
-// use up max_retries.
+// A batch is split after a timeout. Timeouts and preemptions do not count as failures, so they do
+// not use up max_retries.
 TEST_F(Cluster, SplitsDoNotUseUpTheRetries) {
   BuildSpec strict = spec(1);
   strict.run.cluster->max_retries = 0;

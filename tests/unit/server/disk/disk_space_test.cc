@@ -68,8 +68,8 @@ TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   EXPECT_FALSE(space.is_low());
 }
 
-// A client that declares an upload as large as the disk but sends few bytes does not exclude
-// others, because only the space for its next bytes is reserved.
+// A client that declares an upload as large as the disk but sends few bytes does not prevent other
+// uploads, because only the space for its next bytes is reserved.
 TEST(DiskReservations, UploadsThatSendSlowlyKeepNobodyOut) {
   const TemporaryFolder folder;
   SmallDisk disk;

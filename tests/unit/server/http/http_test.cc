@@ -119,8 +119,8 @@ TEST(ConnectionTable, EvictsTheLongestWaiting) {
   EXPECT_EQ(table.size(), 2u);
 }
 
-// If the table is full, a new connection also replaces a connection that has waited for its client
-// in the middle of a body or an answer, but only if it has waited for some time.
+// If the table is full, a new connection can also replace a connection in the middle of a body or
+// an answer, but only after this connection has waited for its client for some time.
 TEST(SlowConnections, SlowTransfersAreEvicted) {
   HttpLimits limits;
   limits.max_connections = 4;

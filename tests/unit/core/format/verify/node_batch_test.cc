@@ -87,8 +87,8 @@ TEST_P(SubtreeTableTest, ParentsHaveTheSumsOfTheirChildren) {
 // limits of both layouts of subtree_table.h.
 INSTANTIATE_TEST_SUITE_P(CubeLevels, SubtreeTableTest, testing::Values(2, 4, 5, 6, 19));
 
-// The first pointer that leads to no node ends the results, whether it is odd, beyond the end of
-// the level, or in the middle of the batch.
+// A pointer leads to no node if its offset is odd or beyond the end of the level. Only the nodes
+// before the first node with such a pointer have results.
 TEST(NodeBatchTest, NamesTheFirstPointerToNoNode) {
   for (const ComputeBatch compute : versions())
     for (const uint32_t broken : {1u, 8u, 0xffffffffu}) {
