@@ -66,8 +66,8 @@ class Source {
     const int64_t up = stored_.file().grid_levels() - section().color_levels();
     return grid_levels_ - up;
   }
-  // True if each cube of `level` is at the place of a cube of the same edge of the file, or outside
-  // the file's grid.
+  // True if each cube of `level` has the position of a cube of the file with the same edge, or is
+  // outside the file's grid.
   bool is_aligned(uint32_t level) const {
     const auto is_multiple = [&](int64_t distance) { return (distance & (edge(level) - 1)) == 0; };
     return std::ranges::all_of(offset_, is_multiple);
@@ -224,7 +224,8 @@ class CombinedColors {
     return {traits_.is_color() ? encode_colors(cube, cursors) : encode_valued(cube, cursors)};
   }
 
-  // Must be called for the regions in the order in which they are written.
+  // Counts a written region for the region of the next coarser tier that contains it. Must be
+  // called for the regions in the order in which they are written.
   void count_region(uint32_t tier, uint64_t code, size_t copied_from) {
     if (!traits_.is_color() || tier + 1 == below_.size()) return;
     const uint64_t parent = code >> 3 * (1 + depth_of(tier + 1));
@@ -288,8 +289,8 @@ class CombinedColors {
              visit);
   }
 
-  // True if the regions of the tier are at the places of regions of the source, with the same
-  // levels.
+  // True if each region of the tier has the position and the levels of a region of the source, or
+  // is outside the source's grid.
   bool has_same_regions(const Source& source, uint32_t tier) const {
     return source.finest() == levels_ && source.is_aligned(region_level(tier)) &&
            source.file_level(region_level(tier)) >= 0 &&

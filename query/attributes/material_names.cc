@@ -14,7 +14,7 @@ namespace {
 // Counts how often each name has occurred.
 class Occurrences {
  public:
-  // Returns the name and the number of its occurrences before this one.
+  // Returns the name, and the number of earlier calls with this name.
   std::pair<std::string_view, uint32_t> next(std::string_view name) {
     return {name, counts_[name]++};
   }

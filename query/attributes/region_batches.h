@@ -73,7 +73,7 @@ class RegionBatches {
     batch_.push_back(cube);
     if (batch_.size() == kBatchRegions) flush();
   }
-  // Must be called after the last region was added.
+  // Encodes and writes the regions of the current batch. Must be called after the last add().
   void flush() {
     std::vector<Region> regions(batch_.size());
     parallel_for_in_order(

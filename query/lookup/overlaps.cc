@@ -112,7 +112,7 @@ class OverlapSearch {
   const Shape& shape_;
 };
 
-// `name` is the name of the number in the shape.
+// Throws Error{kInvalidInput} unless the number is finite. `name` names the number in the message.
 void expect_finite(const std::string& name, double number) {
   if (!std::isfinite(number))
     throw Error(ErrorCode::kInvalidInput,

@@ -18,7 +18,8 @@ class TaskPoller {
  public:
   TaskPoller(ClusterContext& cluster, BatchTable& batches) : cluster_(cluster), batches_(batches) {}
 
-  // Begins a run. Failures of tasks that earlier runs started are not counted from now on.
+  // Begins a run. If a task fails that an earlier run started, the failure does not count in this
+  // run.
   void begin_run();
   // Queries Slurm once for all tasks, then submits batches without a task. If Slurm no longer lists
   // a task, its batch must have a record after a grace period for the shared file system; otherwise

@@ -60,7 +60,7 @@ struct StoredSubvolume {
   SubDagSummary summary;
 };
 
-// An unfinished merge; see Checkpoint.
+// An unfinished merge, as Checkpoint (merge/types/checkpoint.h) describes it.
 struct StoredMerge {
   uint32_t level = 0;  // the merge still reads the artifact levels with smaller numbers
   std::vector<std::byte> state;

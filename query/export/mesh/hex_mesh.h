@@ -66,7 +66,7 @@ class HexSweep {
     uint64_t place = 0;
     uint64_t mask = 0;
   };
-  // The points at the low corners of a brick's cells. `place` as in HexBrick.
+  // The points at the low corners of a brick's cells. `place` has the same meaning as in HexBrick.
   struct PointBrick {
     uint64_t place = 0;
     uint64_t mask = 0;

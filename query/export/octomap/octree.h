@@ -28,8 +28,8 @@ inline constexpr int64_t kHalfTree = int64_t{1} << (kOctoMapLevels - 1);
 void check_octomap_levels(const ExportJob& job);
 // Returns the octree position of the grid's low corner, in cells from the octree's origin.
 Position octomap_place(const ExportJob& job);
-// Adds notes and facts: the translation to the scene, the number of nodes, and the memory that the
-// OctoMap library needs to read the file.
+// Adds notes and facts to the report: the translation to the scene, the number of nodes, and the
+// memory that the OctoMap library needs to read the file.
 void report_octomap(const ExportJob& job, uint64_t nodes, uint64_t inner_nodes,
                     ExportReport& report);
 

@@ -18,7 +18,7 @@ struct BackendChoice {
   unsigned max_workers = 256;  // more workers do not make the build faster
 };
 
-// Throws Error{kInvalidInput} for a method or a rule that the backend does not have, or
+// Throws Error{kInvalidInput} for a method or a rule that the backend does not support, or
 // Error{kDevice} for `cuda` on a machine without a usable GPU.
 void check_backend(const RunOptions& options, VoxelRule rule);
 

@@ -2,11 +2,13 @@
 // voxels reaches from the border of the grid. The stage works on the artifacts of the shell (the
 // voxels that triangles touch), in three steps:
 //
-//   label   each part of the grid, on any thread: the components of its empty space that have a
-//           voxel at its faces (core/dag/space/space_labels.h); the labels at the faces are stored
-//   join    components of neighbors that meet; the sets that reach the border are outside
-//   fill    each part again: its filled sub-DAG (core/dag/space/enclosed_fill.h) becomes an
-//           artifact
+//   label   finds the components of the empty space of each part of the grid that have a voxel at
+//           the part's faces (core/dag/space/space_labels.h), and stores the labels at the faces;
+//           several threads label parts
+//   join    joins the components of neighboring parts where they meet; joined components that
+//           reach the border of the grid are outside
+//   fill    fills the enclosed components of each part (core/dag/space/enclosed_fill.h), and writes
+//           the filled sub-DAG of the part as an artifact
 //
 // With a radius, these steps work on positions of a walking cube instead of voxels (cube_walks.h).
 //

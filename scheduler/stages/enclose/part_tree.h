@@ -1,4 +1,4 @@
-// The octree of the grid, down to given cubes and to the maximal empty cubes between them.
+// The octree of the grid. Its leaves are given cubes, and the maximal empty cubes between them.
 #pragma once
 
 #include <array>

@@ -114,7 +114,7 @@ class PilotBuilder {
     return true;
   }
 
-  // Returns the build's radius in voxels of a pilot with 2^levels voxels per edge, rounded.
+  // Converts the build's radius to voxels of a pilot with 2^levels voxels per edge, and rounds it.
   uint32_t pilot_radius(uint32_t levels) const {
     const uint64_t edge = uint64_t{1} << levels, scale = options_.resolution / edge;
     return static_cast<uint32_t>(std::min((options_.radius + scale / 2) / scale, edge - 1));

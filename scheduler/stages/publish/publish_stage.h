@@ -21,9 +21,9 @@ namespace voxdag {
 // sections are unchanged. If it returns true, it also fills in the report.
 bool is_published(BuildJob& job, AttributeSections& attributes);
 
-// Writes checksums, syncs the file and fills in the job's report. Then writes the text that
-// `report_text` returns to the report's file, unless the options name none, renames both files and
-// syncs their folders.
+// Writes checksums, syncs the file and fills in the job's report. Then calls report_text() and
+// writes the returned text to the file of the report, unless the options name no report. Renames
+// both files and syncs their folders.
 void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes,
              const std::function<std::string()>& report_text);
 

@@ -2,10 +2,11 @@
 // sample rows, blocks and views.
 //
 // The square of a cube is its projection along the axis. The column's square is the square of its
-// largest subvolume and contains the squares of the others. The rows are stored by tiles of the
-// square, each with the rows on all its borders. A row on a border of tiles has a copy in each of
-// these tiles, and advance() changes only the copies in the subvolume's tiles. A crossing on a
-// border is in the subvolumes on both sides, so all copies of a row have the same total.
+// largest subvolume and contains the squares of the other subvolumes. The rows are stored by tiles
+// of the square. Each tile has the rows on all its borders. So a row on a border of tiles has a
+// copy in each of these tiles, and advance() changes only the copies in the subvolume's tiles. A
+// crossing on a border is in the subvolumes on both sides, so all copies of a row have the same
+// total.
 //
 // Subvolumes and empty cubes are visited in Morton order. In this order everything in front of a
 // cube, seen along any axis, comes before the cube.
