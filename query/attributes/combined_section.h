@@ -12,9 +12,9 @@
 //
 // If the finest cells of a file are larger than the cells of the result, a cell of the result gets
 // the value of the larger cell that contains it. If B is moved and its cells do not align with the
-// result's cells, a cell of the result gets the value of the cell of B that overlaps it most. This
-// cell of B must have voxels, and it has the size of the result's cell. On ties, the cell with the
-// lowest x is used, then the cell with the lowest y, then the cell with the lowest z.
+// result's cells, a cell of the result gets the value of the cell of B that overlaps it most. Only
+// cells of B that have voxels and the size of the result's cell are considered. On ties, the cell
+// with the lowest x is used, then the cell with the lowest y, then the cell with the lowest z.
 //
 // The color of a coarser cell is the mean, in linear light, of the cell's finest cells. The other
 // attributes have rules for coarser cells (docs/format.md).

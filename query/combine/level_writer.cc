@@ -175,9 +175,9 @@ void LevelsWriter::make_rows(SpillSorter<PairRow>& rows) {
   children_.reset();
 }
 
-// Passes the results of this level's pairs on to the places (result_rows.h) in `uses`, whose
-// results they are. Adds each place's result to children_, and the change of its counts to counts_.
-// `results` has the results of the pairs.
+// `results` has the results of this level's pairs. `uses` lists, for each pair, the places
+// (result_rows.h) whose result is the result of the pair. Adds the result of each place to
+// children_, and the change of the place's counts to counts_.
 void LevelsWriter::add_pair_results(const SpillList<PairUse>& uses,
                                     SpillSorter<KeyedNode>& results) {
   results.finish();

@@ -61,7 +61,7 @@ class BrickWalk {
   }
 
  private:
-  // Returns false if the visitor has ended the walk.
+  // Visits an octree cube (dag_view.h). Returns false if the visitor has ended the walk.
   bool enter(uint32_t depth, const Position& low, uint64_t content) {
     if (depth + kBrickLevels == selection_.grid_levels)
       return brick(low, brick_of_cells(dag_, depth, content));

@@ -25,9 +25,9 @@ class PackageReader {
   uint32_t grid_levels() const { return grid_levels_; }
   // Returns the words of a tile, as encode_tile() returns them, with one difference. A node at
   // which the tile ends is the root of another tile. The words have the number of this other tile
-  // instead of the node's word offset.
-  // `number` is the number of the tile among the tiles whose roots are on `level`. Throws
-  // Error{kNotFound} if the package has no such tile, and Error{kCorrupt} if its block is damaged.
+  // instead of the node's word offset. `number` is the number of the requested tile among the tiles
+  // whose roots are on `level`. Throws Error{kNotFound} if the package has no such tile, and
+  // Error{kCorrupt} if the tile's block is damaged.
   std::vector<uint32_t> tile(uint32_t level, uint64_t number) const;
   // Returns the words of a color page (color_page.h). The result is {0} if no cell of the page is
   // set.

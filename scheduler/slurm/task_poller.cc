@@ -224,7 +224,8 @@ std::string TaskPoller::try_submit_merge_job() {
   return find_job(request.name);
 }
 
-// Returns the id of a job; "" if it does not exist. Repeats the query until Slurm answers.
+// Returns the id of the job with this name; "" if there is none. Repeats the query until Slurm
+// answers.
 std::string TaskPoller::find_job(const std::string& name) {
   for (;;) {
     if (const auto jobs = cluster_.slurm.jobs(name)) return jobs->empty() ? "" : jobs->front().id;

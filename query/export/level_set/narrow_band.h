@@ -96,7 +96,7 @@ class BandWalk {
  private:
   static constexpr int64_t kTileEdge = 64;
 
-  // Returns false if a visitor has ended the walk.
+  // Visits a cube. Returns false if a visitor has ended the walk.
   bool enter(const Position& low, int64_t edge) {
     if (!domain_.intersects(low, edge)) return true;
     Region box{low, low};

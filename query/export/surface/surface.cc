@@ -16,7 +16,7 @@ Position low_corner(const RowBrick& brick, uint8_t axis) {
   return low;
 }
 
-// Returns the bricks at the start of `bricks` for which number_of() is the same.
+// Returns the bricks at the start of `bricks` that have the same number_of() as the first brick.
 template <class NumberOf>
 std::span<const RowBrick> first_group(std::span<const RowBrick> bricks, const NumberOf& number_of) {
   size_t end = 0;

@@ -50,8 +50,8 @@ class Surface {
     uint32_t u0, u1;  // in cells of the grid
     voxdag_reader::Rgb color;
   };
-  // The rectangles of a plane that extend to row `v`, the last visited row of faces with
-  // rectangles. They are indices into rectangles_.
+  // `v` is the last visited row of a plane that has faces. `rectangles` has the indices in
+  // rectangles_ of the rectangles that extend to this row.
   struct PlaneRow {
     int64_t v = -2;
     std::vector<size_t> rectangles;

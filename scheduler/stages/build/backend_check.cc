@@ -1,4 +1,4 @@
-// difference_from_cpu() of choose_backend.h.
+// Implements difference_from_cpu() (choose_backend.h).
 
 #include <span>
 #include <vector>

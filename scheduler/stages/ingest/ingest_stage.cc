@@ -202,9 +202,9 @@ class Preparation {
   }
   const Cutouts* cutouts() const { return cutouts_ ? &*cutouts_ : nullptr; }
 
-  // Enables checkpoints. If the scene's files were changed just before they were opened, a further
-  // change might leave their times as they are. Then first waits until trusted_from_ns(), unless
-  // this takes longer than kMaxWaitNs.
+  // Enables checkpoints. If the scene's files were changed just before they were opened, it is
+  // possible that a further change does not change their times. In this case, first waits until
+  // trusted_from_ns(), unless this takes longer than kMaxWaitNs.
   void enable_checkpoints() {
     checkpoint_.forget();
     if (!checkpoint_.is_worthwhile(scene_.open())) return;
