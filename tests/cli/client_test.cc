@@ -155,7 +155,7 @@ TEST_F(Client, LabelsAndFindsJobs) {
   EXPECT_EQ(metric("voxdag_uploaded_bytes_total"), uploaded);
 }
 
-// On a terminal, `jobs` cuts each line to the terminal's width. Otherwise it prints all of it.
+// On a terminal, `jobs` cuts each line to the terminal's width. Otherwise it prints complete lines.
 TEST_F(Client, CutsTheTableAtTheWidthOfTheTerminal) {
   const std::string name = "begin of the name, " + std::string(100, 'x') + " end";
   run_json({"submit", "m.glb", "-r", "16", "--name", name});

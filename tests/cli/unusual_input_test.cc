@@ -100,7 +100,7 @@ TEST_F(UnusualInput, ForeignFilesAreNotOverwritten) {
   for (std::vector<std::string> args : {render, generate}) {
     SCOPED_TRACE(args[0]);
     // These files are not replaced: a text, the beginnings of a picture and of a scene, which
-    // another program may have made, and a file of one byte.
+    // another program could have made, and a file of one byte.
     for (const char* bytes : {"mine", "\x89PNG\r\n\x1a\n", "glTF", "g"}) {
       put("mine", bytes);
       args.push_back("mine");

@@ -15,7 +15,7 @@ struct Work {
 };
 
 // Returns tasks with different grids, cubes, hash bits and scenes. Some tasks have the same
-// triangles, as the subvolumes of one build may have.
+// triangles, as the subvolumes of one build can have.
 std::vector<Work> make_work() {
   std::vector<Work> all;
   oracle::Random random(41);

@@ -1,4 +1,4 @@
-// A build is killed, loses power, or its disk becomes full or fails, at any disk operation. The
+// At any disk operation, a build is killed or loses power, or its disk becomes full or fails. The
 // next build resumes and gives the same bytes.
 //
 // By default, the tests choose a few operations at random. VOXDAG_CRASH_ROUNDS=N sets the number of

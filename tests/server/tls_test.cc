@@ -17,7 +17,7 @@ namespace voxdag::server {
 namespace {
 
 // Writes a self-signed certificate for 127.0.0.1, and its key. The certificate is not for
-// localhost, because a container may not resolve this name.
+// localhost, because some containers do not resolve this name.
 void make_certificate(const std::string& certificate_file, const std::string& key_file) {
   EVP_PKEY* key = EVP_EC_gen("P-256");
   X509* certificate = X509_new();

@@ -49,9 +49,9 @@ class DeviceMemory {
   // Removes the access rights immediately, for all code.
   void close_now();
 
-  // For operations of the device other than kernels (copies, memsets and calls of CUB): checks of a
-  // range that they read or write, and changes of its state. `what` is the beginning of the message
-  // of a violation.
+  // Operations of the device other than kernels (copies, memsets and calls of CUB) call these
+  // functions for each range that they read or write, to check the range or to change its state.
+  // `what` is the beginning of the message of a violation.
   void expect_allocated(const void* p, uint64_t bytes, const std::string& what) const;
   void expect_written(const void* p, uint64_t bytes, const std::string& what) const;
   void mark_written(void* p, uint64_t bytes);

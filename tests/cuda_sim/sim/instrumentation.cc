@@ -1,7 +1,7 @@
 // The backend's sources are compiled with -fsanitize=thread, so the compiler inserts a function
 // call before each memory access. This file defines the called functions; the sanitizer's own
-// library is not linked. While a kernel runs, they check the accesses of its threads. While the
-// host runs, they check that it does not access device memory.
+// library is not linked. While a kernel runs, the functions check the accesses of its
+// threads. While the host runs, they check that it does not access device memory.
 #include <algorithm>
 #include <bit>
 #include <cstddef>

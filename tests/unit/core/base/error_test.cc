@@ -39,8 +39,8 @@ TEST(ErrorTable, IsAsPromised) {
   }
 }
 
-// Every error has a different exit status. It is neither success nor a status that the shell uses
-// (126 and above, except for Ctrl-C).
+// Each error has a different exit status. No error has the status 0 (success), 1, or a status that
+// the shell uses (126 and above). The exception is kCanceled, which has the status of Ctrl-C.
 TEST(ErrorTable, ExitStatusesAreDistinctAndNotTheShells) {
   std::set<int> seen;
   for (const Row& row : kPromised) {

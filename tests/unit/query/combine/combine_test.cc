@@ -93,8 +93,8 @@ TEST_F(Combine, Identities) {
               combined("all", Operation::kMinus, "either", "d"));
 }
 
-// combine() visits pairs of nodes, one of each file, at the same place. It does not visit the
-// children of two equal nodes, so files that differ in one voxel have few pairs.
+// combine() visits pairs of nodes: one node of each file, for the same cube of the grid. It does
+// not visit the children of two equal nodes, so files that differ in one voxel have few pairs.
 TEST_F(Combine, FewPairsOfSimilarFiles) {
   const oracle::Voxels a = random_voxels(6, 128);
   oracle::Voxels b = a;

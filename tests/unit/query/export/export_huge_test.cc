@@ -1,7 +1,7 @@
 // Tests limits of formats that only files of many gigabytes reach. The header of the input has the
 // large counts, and its levels are a hole in the file; some tests lower a limit instead. An export
-// of exactly the limit is accepted. An export of one more is refused; the message names a level
-// that fits, and no files remain.
+// whose count equals the limit is accepted. If the count exceeds the limit by one, the export is
+// refused, the message names a level that fits, and no files remain.
 #include <gtest/gtest.h>
 
 #include <cstring>

@@ -82,7 +82,7 @@ class Package : public testing::Test {
 uint64_t compare_tiles(const voxdag_reader::File& file, const PackageReader& package) {
   const DagView dag(file);
   const uint32_t bricks = file.brick_level();
-  std::vector<uint64_t> offsets = {0};  // roots of the current band, by tile number
+  std::vector<uint64_t> offsets = {0};  // word offsets of the current band's roots, by tile number
   uint64_t count = 0;
   for (uint32_t level = 0; level < bricks;) {
     std::map<uint64_t, uint64_t> below;  // number -> word offset

@@ -13,7 +13,7 @@
 class MemoryFiles : public voxdag::FileSystem {
  public:
   std::map<std::string, std::string> files;
-  uint64_t capacity = UINT64_MAX;  // bytes that a file may take
+  uint64_t capacity = UINT64_MAX;  // maximum size of a file, in bytes
   bool keep = true;                // false: writes are counted and forgotten
   uint64_t written = 0;
   uint64_t largest_write = 0;

@@ -118,8 +118,8 @@ TEST(PolygonFiles, CrossedObjAndStlFacesAreNamed) {
               ElementsAre(HasSubstr("line 11: the edges of a facet cross each other")));
 }
 
-// A vertex that is missing or not finite is refused by name. With skip_invalid, later faces are
-// read.
+// If a vertex is missing or not finite, the error names the face. With skip_invalid, later faces
+// are read.
 TEST(PolygonFiles, InvalidVerticesOfObjPolygons) {
   const std::string file = "v 0 0 0\nv 4 1 0\nv 0 2 0\nv 1 1 0\nv nan 0 0\nf 1 2 3 9\nf 1 2 5 4\n";
   EXPECT_THAT(error_of_file(file).message(), HasSubstr("face 0 in line 6: index 9"));

@@ -108,8 +108,8 @@ TEST_F(JobStoreTest, CheckpointsAndProgressCreateTheFile) {
   }
 }
 
-// A subvolume that is built but not recorded is planned again after forget_built_in_memory(). A
-// recorded subvolume remains built.
+// A subvolume that is built but not recorded has the state kPlanned again after
+// forget_built_in_memory(). A recorded subvolume remains built.
 TEST_F(JobStoreTest, ForgetsWhatIsBuiltInMemoryOnly) {
   JobStore store(path(), JobStore::Access::kBuild);
   store.start(job_, plan(2));

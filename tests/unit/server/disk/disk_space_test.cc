@@ -45,8 +45,9 @@ bool fits(DiskSpace& space, uint64_t announced) {
   }
 }
 
-// Uploads must leave 30 MiB of the disk free. An upload that declares more than the rest is refused
-// when it begins. An upload of unknown size is stopped before it uses the 30 MiB.
+// Uploads must leave 30 MiB of the disk free. An upload that declares more bytes than are free
+// beyond these 30 MiB is refused when it begins. An upload of unknown size is stopped before it
+// uses the 30 MiB.
 TEST(DiskReservations, UploadsLeaveThePartOfTheDiskThatStaysFree) {
   const TemporaryFolder folder;
   SmallDisk disk;

@@ -82,7 +82,7 @@ TEST_F(ArtifactCopyTest, EntriesOfSolidsHaveTheirCounts) {
             ErrorCode::kCorrupt);
 }
 
-// Cache entries are not synced, so after a power cut they may contain anything. Reading an entry
+// Cache entries are not synced, so after a power cut they can contain anything. Reading an entry
 // with one flipped bit, or a truncated entry, throws Error.
 TEST_F(ArtifactCopyTest, EveryBitFlipAndTruncationIsCaught) {
   const ByteString bytes = read_bytes(entry_path_);

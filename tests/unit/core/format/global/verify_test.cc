@@ -103,8 +103,8 @@ TEST_F(VerifyTest, TrailingBytesAreCaught) {
   }
 }
 
-// Every pass over the file reports the bytes that it read: checksums, index and nodes. Pages that
-// are dropped in the middle are read again.
+// Each of the three passes over the file (checksums, index and nodes) reports the bytes that it
+// reads to PageLimit. PageLimit drops pages during the passes, and the file is still valid.
 TEST_F(VerifyTest, PagesAreDroppedAboveTheLimit) {
   write_global(path_, random_voxels(5, 128));
   const auto file = open_global_file(path_);
