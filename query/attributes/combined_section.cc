@@ -109,8 +109,9 @@ class Source {
   }
 
   // Finds the value of a cell (combined_section.h): returns the region that has it, valid until
-  // the next call, and sets `i` to its index in the region. Returns null if the file has no voxel
-  // there.
+  // the next call, and sets `i` to its index in the region. Returns null if no cube of the file
+  // that overlaps the cell has voxels. These voxels can be outside the cell if
+  // !is_aligned(level).
   const ColorRegion* find(ColorCursor& cursor, uint32_t level, uint64_t code, uint64_t& i) const {
     struct Candidate {
       Position at;
@@ -173,6 +174,8 @@ class CombinedColors {
       : traits_(traits_of(attribute.attribute)),
         result_(from.result),
         dag_(from.result),
+        moved_b_(from.moved_b),
+        moved_b_dag_(from.moved_b),
         fill_(from.fill),
         cancel_(cancel) {
     const uint32_t levels = result_.grid_levels();
@@ -185,6 +188,8 @@ class CombinedColors {
     int64_t finest = kBrickLevels;
     for (const auto& source : sources_) finest = std::max(finest, source->finest());
     levels_ = static_cast<uint32_t>(finest);
+    // Without a fill color, B has a voxel in each cell in which A has none.
+    tests_b_ = attribute.from_b && fill_ && !sources_.back()->is_aligned(levels_);
     below_.resize(color_layout::tier_count(levels_));
     if (traits_.has_names()) join_materials();
   }
@@ -200,6 +205,7 @@ class CombinedColors {
       source->stored().check_index(static_cast<uint32_t>(source->file_level(levels_)));
       mapped.push_back(&source->stored().file());
     }
+    if (tests_b_) mapped.push_back(&moved_b_);
     pages_ = std::make_unique<ResidentPages>(std::move(mapped), limit_bytes, workers);
   }
   void release_pages() const { pages_->release(); }
@@ -297,15 +303,17 @@ class CombinedColors {
            color_layout::levels_in_region(
                color_layout::finest_level(source.section().color_levels(), tier)) == depth_of(tier);
   }
-  // Returns the source's cube at `file_code`; nothing if the source has no voxels there.
-  std::optional<uint64_t> content_at(const Source& source, uint32_t file_level,
+  // Returns the cube of a file at `file_code`; nothing if the file has no voxels there. `dag` has
+  // the file's voxels.
+  std::optional<uint64_t> content_at(const DagView& dag, uint32_t file_level,
                                      uint64_t file_code) const {
-    uint64_t content = source.dag().root();
+    if (dag.empty()) return std::nullopt;
+    uint64_t content = dag.root();
     for (uint32_t level = 0; level < file_level; ++level) {
-      const DagView::Children children = children_of(source.dag(), level, content);
+      const DagView::Children children = children_of(dag, level, content);
       const int index = static_cast<int>(file_code >> 3 * (file_level - level - 1) & 7);
       if (!children.has(index)) return std::nullopt;
-      content = source.dag().content(level, children, index);
+      content = dag.content(level, children, index);
     }
     return content;
   }
@@ -337,7 +345,7 @@ class CombinedColors {
       const auto file_code = source.file_code(level, cube.code);
       if (!file_code) continue;
       const auto file_content =
-          content_at(source, static_cast<uint32_t>(source.file_level(level)), *file_code);
+          content_at(source.dag(), static_cast<uint32_t>(source.file_level(level)), *file_code);
       if (!file_content) continue;
       // The source has voxels in the region. Its values come first, so the region cannot be copied
       // from a later source.
@@ -373,6 +381,8 @@ class CombinedColors {
   void find_value(std::vector<ColorCursor>& cursors, uint64_t code, const Take& take,
                   const None& none) const {
     for (size_t s = 0; s < sources_.size(); ++s) {
+      const bool is_tested = tests_b_ && s + 1 == sources_.size();
+      if (is_tested && !content_at(moved_b_dag_, levels_, code)) continue;
       uint64_t i = 0;
       if (const ColorRegion* const region = sources_[s]->find(cursors[s], levels_, code, i))
         return take(s, *region, i);
@@ -423,10 +433,15 @@ class CombinedColors {
   const AttributeTraits& traits_;
   const voxdag_reader::File& result_;
   const DagView dag_;
+  const voxdag_reader::File& moved_b_;
+  const DagView moved_b_dag_;
   const std::optional<voxdag_reader::Rgb> fill_;
   const CancelToken& cancel_;
   // A finest cell gets its value from the first source that has a value for it.
   std::vector<std::unique_ptr<Source>> sources_;
+  // True if B, the last source, has values only in cells in which the moved B has voxels. This must
+  // be tested, because its cubes do not align with the cells.
+  bool tests_b_ = false;
   std::unique_ptr<const ResidentPages> pages_;
   uint32_t levels_ = 0;
   std::vector<std::string> names_;

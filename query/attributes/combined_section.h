@@ -12,9 +12,10 @@
 //
 // If the finest cells of a file are larger than the cells of the result, a cell of the result gets
 // the value of the larger cell that contains it. If B is moved and its cells do not align with the
-// result's cells, a cell of the result gets the value of the cell of B that overlaps it most. Only
-// cells of B that have voxels and the size of the result's cell are considered. On ties, the cell
-// with the lowest x is used, then the cell with the lowest y, then the cell with the lowest z.
+// result's cells, then by rule 2 a cell of the result gets the value of the cell of B that overlaps
+// it most. Only cells of B that have voxels and the size of the result's cell are considered. On
+// ties, the cell with the lowest x is used, then the cell with the lowest y, then the cell with the
+// lowest z.
 //
 // The color of a coarser cell is the mean, in linear light, of the cell's finest cells. The other
 // attributes have rules for coarser cells (docs/format.md).
@@ -49,7 +50,8 @@ struct CombinedAttribute {
 struct CombinedFiles {
   const voxdag_reader::File& result;  // has the voxels of the result; not empty
   const voxdag_reader::File& a;
-  const voxdag_reader::File& b;  // as it was given, not moved
+  const voxdag_reader::File& b;        // as it was given, not moved
+  const voxdag_reader::File& moved_b;  // B's voxels in the result's grid
   // The voxel of the result's grid at which B's voxel (0, 0, 0) is placed.
   std::array<int64_t, 3> offset = {};
   std::optional<voxdag_reader::Rgb> fill;

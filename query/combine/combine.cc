@@ -250,8 +250,8 @@ class Combination {
     watched.run([&] {
       DagInput input(*result, work_.spec.memory_bytes, cancel_);
       copy_levels(input, out);
-      const CombinedFiles from{*result, a_.file(), attributes_.b, attributes_.offset,
-                               work_.spec.fill_color};
+      const CombinedFiles from{*result,   a_.file(),          attributes_.b,
+                               b_.file(), attributes_.offset, work_.spec.fill_color};
       for (const CombinedAttribute& attribute : attributes_.attributes)
         write_combined_attribute(from, attribute, work_.files, out, work_.budget,
                                  work_.spec.threads, progress_, cancel_);

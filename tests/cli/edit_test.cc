@@ -112,6 +112,11 @@ TEST_F(Edit, Colors) {
       run_json({"edit", "a.vdag", "--add", "b.glb", "--no-attributes", "-o", "plain.vdag"});
   EXPECT_EQ(plain["voxels"], both["voxels"]);
   EXPECT_FALSE(run_json({"info", "plain.vdag"}).contains("colors"));
+  // The cut removes all voxels. The scene is still built with the colors of the original file.
+  run_json(
+      {"edit", "a.vdag", "--cut", "box:0,0,0,128,128,128", "--add", "b.glb", "-o", "only.vdag"});
+  build({"b.glb"}, "b.vdag", {}, {"--color", "--color-resolution", "64"});
+  expect_equal("only.vdag", "b.vdag");
 }
 
 TEST_F(Edit, RefusesBadArguments) {

@@ -101,15 +101,19 @@ class CombineColors : public Combine {
   }
 
   // Returns the code of the cell of b's color grid from which the result's cell at `code` takes its
-  // color. Returns nullopt if b has no voxel in the result's cell. The result has cells of `edge`
-  // voxels.
+  // color. Returns nullopt if the moved b has no voxel in the result's cell. The result has cells
+  // of `edge` voxels.
   std::optional<uint64_t> color_cell_of_b(uint64_t code, int64_t edge, const Position& offset) {
     const ColoredScene& b = scenes_[1];
     if (cells_of_b_.empty())
       for (const uint64_t voxel : b.voxels) {
-        const Position at = position_of(voxel);
+        Position at = position_of(voxel);
         cells_of_b_.insert({at[0] / edge, at[1] / edge, at[2] / edge});
+        for (size_t axis = 0; axis < 3; ++axis) at[axis] += offset[axis];
+        if (std::ranges::all_of(at, [](int64_t i) { return i >= 0; }))
+          cells_with_b_.insert({at[0] / edge, at[1] / edge, at[2] / edge});
       }
+    if (!cells_with_b_.contains(position_of(code))) return std::nullopt;
     const Position low = position_of(code);
     int64_t largest = 0;
     Position best = {};
@@ -126,7 +130,6 @@ class CombineColors : public Combine {
         best = cell;
       }
     }
-    if (largest == 0) return std::nullopt;
     const int64_t color_edge = int64_t{1} << (b.levels - b.color_levels);
     for (int64_t& i : best) i = i * edge / color_edge;
     return code_of(best);
@@ -148,6 +151,7 @@ class CombineColors : public Combine {
     std::set<uint64_t> cells_of_a;
     for (const uint64_t voxel : a.voxels) cells_of_a.insert(voxel >> 3 * (a.levels - color_levels));
     cells_of_b_.clear();
+    cells_with_b_.clear();
     // By level and cell: the sum of the linear intensities of the finest cells, and their number.
     std::map<std::pair<uint32_t, uint64_t>, std::pair<double, double>> means;
     for (const uint64_t code : result.cells(color_levels)) {
@@ -161,6 +165,8 @@ class CombineColors : public Combine {
                                   : std::nullopt) {
         gray = gray_of(1, *cell);
         ++from_b_;
+      } else {
+        ++filled_;
       }
       ASSERT_GE(gray, 0);
       for (uint32_t level = 0; level <= color_levels; ++level) {
@@ -177,8 +183,9 @@ class CombineColors : public Combine {
   }
 
   ColoredScene scenes_[2];
-  std::set<Position> cells_of_b_;
-  size_t from_a_ = 0, from_b_ = 0;
+  std::set<Position> cells_of_b_;    // cubes of b's grid that have voxels
+  std::set<Position> cells_with_b_;  // cells of the result that have voxels of the moved b
+  size_t from_a_ = 0, from_b_ = 0, filled_ = 0;
 };
 
 TEST_F(CombineColors, AllOperations) {
@@ -214,6 +221,41 @@ TEST_F(CombineColors, Offset) {
     }
   }
   EXPECT_GT(from_b_, 500u);
+}
+
+// Only b has colors, and it is moved. A cell of the result can overlap a cube of b whose voxels are
+// all in other cells of the result. Such a cell has the fill color.
+TEST_F(CombineColors, OffsetAndFill) {
+  for (const auto& [levels_b, color_b] : {std::pair{6u, 4u}, {5u, 3u}, {7u, 6u}, {8u, 5u}}) {
+    SCOPED_TRACE(testing::Message() << levels_b << " " << color_b);
+    write(6, 6, levels_b, color_b, 300);
+    write_file(0, false);
+    CombineSpec moved = spec(Operation::kUnion, "c");
+    moved.fill_color = voxdag_reader::Rgb{0, 0, 0};
+    moved.clip = true;
+    for (const Position& offset : {Position{4, -8, 0}, {2, 0, 0}, {1, 2, 3}, {-5, 7, 10}}) {
+      moved.offset = offset;
+      for (const Operation operation : {Operation::kUnion, Operation::kXor}) {
+        moved.operation = operation;
+        check(moved, color_b + 6 - levels_b, {false, true}, 0);
+      }
+    }
+  }
+  EXPECT_GT(from_b_, 500u);
+  EXPECT_GT(filled_, 500u);
+
+  // Each file has one voxel.
+  scenes_[0] = {6, 6, {code_of({7, 0, 0})}, grays(0)};
+  scenes_[1] = {6, 4, {code_of({0, 0, 0})}, grays(1)};
+  write_file(0, false);
+  write_file(1, true);
+  CombineSpec moved = spec(Operation::kUnion, "c");
+  moved.fill_color = voxdag_reader::Rgb{0, 0, 0};
+  moved.offset = Position{2, 0, 0};
+  from_b_ = filled_ = 0;
+  check(moved, 4, {false, true}, 0);
+  EXPECT_EQ(from_b_, 1u);
+  EXPECT_EQ(filled_, 1u);
 }
 
 // If the result has exactly the cells of one input, it has the bytes of this input. The color
