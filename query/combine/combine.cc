@@ -333,10 +333,11 @@ CombineReport combine_moved(const voxdag_reader::File& a, const AttributeInputs&
   const auto moved = move_file(a, attributes, work, progress, cancel);
   const uint64_t clipped = b.voxels() - moved->voxels();
   if (clipped > 0 && !work.spec.clip)
-    throw Error(ErrorCode::kInvalidInput,
-                b.path() + ": " + std::to_string(clipped) + " of its " +
-                    std::to_string(b.voxels()) + " voxels would be outside of the grid of " +
-                    a.path() + ": expected another offset, or --clip to drop them");
+    throw Error(ErrorCode::kInvalidInput, b.path() + ": " + std::to_string(clipped) + " of its " +
+                                              std::to_string(b.voxels()) +
+                                              " voxels would be outside of the grid of " +
+                                              a.path() + ": expected another offset, or " +
+                                              option_text("clip") + " to drop them");
   CombineReport report =
       Combination(a, *moved, nullptr, attributes, work, progress, cancel).run(before_publish);
   report.clipped = clipped;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/base/options/option_text.h"
 #include "core/image/image_formats.h"
 #include "core/io/lfs_pointer.h"
 #include "scene/messages.h"
@@ -195,8 +196,8 @@ std::string describe_points(std::string_view text) {
   if (take_line_of_numbers(text) != 1) return "";
   size_t numbers = take_line_of_numbers(text);
   if (numbers >= 3)
-    return "is a PTS point cloud: remove its first line, and name the rest .xyz; --columns "
-           "x,y,z,_,r,g,b reads its colors";
+    return "is a PTS point cloud: remove its first line, and name the rest .xyz; " +
+           option_text("columns", "x,y,z,_,r,g,b") + " reads its colors";
   if (numbers == 1 && take_line_of_numbers(text) == 3)
     return "is a PTX point cloud: convert it to LAS or PLY";
   return "";

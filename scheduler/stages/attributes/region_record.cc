@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 
 namespace voxdag {
 namespace {
@@ -40,7 +41,8 @@ std::optional<EncodedRegion> RegionRecords::next() {
     throw Error(ErrorCode::kCorrupt,
                 path_ + ": record " + std::to_string(count_) +
                     " of the stored attributes is cut off: expected a complete region; start over "
-                    "with --restart");
+                    "with " +
+                    option_text("restart"));
   ++count_;
   region.blocks.assign(blocks.begin(), blocks.end());
   region.prefix.resize(prefixes);

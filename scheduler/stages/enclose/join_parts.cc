@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/dag/space/face_code.h"
 #include "scheduler/stages/enclose/part_tree.h"
 
@@ -209,7 +210,7 @@ class PartJoiner {
                     ": the labels of the empty space at a face of a subvolume are damaged: label " +
                     std::to_string(label) +
                     " is not the number of a component, expected less than " +
-                    std::to_string(components) + "; start over with --restart");
+                    std::to_string(components) + "; start over with " + option_text("restart"));
   }
 
   // The face quadtree that was read last. It is kept because a large cube has many small neighbors

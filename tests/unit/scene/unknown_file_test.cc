@@ -67,7 +67,9 @@ TEST(UnknownFile, IsNamedByItsFirstBytes) {
       {"LZIP\x01", "is compressed by lzip"},
       {old_tar("model.obj"), "is a tar archive: unpack it first"},
       {"ASTM-E57\x01", "is an E57 point cloud: convert it to PLY or LAS"},
-      {"3\n0 0 0 9 255 0 0\n1 0 0 9 0 0 0\n", "is a PTS point cloud: remove its first line"},
+      {"3\n0 0 0 9 255 0 0\n1 0 0 9 0 0 0\n",
+       "is a PTS point cloud: remove its first line, and name the rest .xyz; --columns "
+       "x,y,z,_,r,g,b reads its colors"},
       {"2\r\n2\r\n0 0 0\r\n1 0 0\r\n", "is a PTX point cloud: convert it to LAS or PLY"},
       {"// made by hand\n{\"asset\": 1}", "is JSON with comments, which glTF does not allow"},
       {"/* a */ // b\r\n\n{}", "is JSON with comments, which glTF does not allow"},

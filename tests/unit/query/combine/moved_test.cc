@@ -111,8 +111,9 @@ TEST_F(CombineMoved, Refusals) {
     EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
     return error.message();
   };
-  EXPECT_NE(message("b").find("384 of its 512 voxels would be outside of the grid"),
-            std::string::npos);
+  const std::string text = message("b");
+  EXPECT_NE(text.find("384 of its 512 voxels would be outside of the grid"), std::string::npos);
+  EXPECT_TRUE(text.ends_with(": expected another offset, or --clip to drop them")) << text;
   EXPECT_TRUE(message("other").starts_with("only files with equal voxels can be combined"));
   expect_files({"a", "b", "other"});
 }
