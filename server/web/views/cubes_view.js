@@ -32,7 +32,7 @@ export class CubesView {
         h("div", {class: "cubes-view"}, this.canvas,
           h("div", {class: "split"}, this.note, this.turner));
     this.count = undefined;  // the text about the built subvolumes
-    this.colorText = "";
+    this.attributesText = "";
     this.setEmpty(true);
     this.sayWhyEmpty(false, false);
     const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -48,7 +48,7 @@ export class CubesView {
       if (!this.cubes.length) this.sayWhyEmpty(hasEnded(job.state), !total || key === this.key);
     };
     sayIfEmpty();
-    this.colorText = colorText(job);
+    this.attributesText = attributesText(job);
     this.showNote();
     if (!total || key === this.key || this.fetching) return;
     const waitMs = this.nextFetchMs - performance.now();
@@ -93,11 +93,11 @@ export class CubesView {
     this.showNote();
   }
 
-  // Shows how many subvolumes are built and, once they are, the progress of their colors.
+  // Shows how many subvolumes are built and, once they are, the progress of their attributes.
   showNote() {
     if (this.count === undefined) return;
-    setText(this.note, this.count + this.colorText);
-    this.canvas.setAttribute("aria-label", this.count + this.colorText);
+    setText(this.note, this.count + this.attributesText);
+    this.canvas.setAttribute("aria-label", this.count + this.attributesText);
   }
 
   setEmpty(empty) {
@@ -252,10 +252,12 @@ export class CubesView {
   }
 }
 
-// Returns the progress of the colors of a running job; "" in all other stages.
-function colorText({state, progress}) {
+// Returns the progress of the stage that makes the colors and other attributes of a running job; ""
+// in all other stages.
+function attributesText({state, progress}) {
   if (state !== "running" || progress?.stage !== "color" || !progress.total) return "";
-  return `. Colors: ${Math.floor(100 * progress.done / progress.total)} % of the regions are ready`;
+  const percent = Math.floor(100 * progress.done / progress.total);
+  return `. Attributes: ${percent} % of the regions are ready`;
 }
 
 // Returns the Morton code of a position. A coordinate has up to 17 bits, so a double represents the

@@ -33,7 +33,7 @@ export class Banner {
 
   // `job` is null while the service does not answer. `built` and `total` are the last known numbers
   // of built subvolumes and of all subvolumes. `isMerged` is true if the picture shows all voxels,
-  // and only their colors are missing.
+  // and only their colors or other attributes are missing.
   show(job, {built = 0, total = 0}, isMerged = false) {
     setText(this.text, job ? describe(job, built, total, isMerged) : kNoAnswer);
     this.kinds.waiting.hidden = this.kinds.built.hidden = !this.wires.drawsAll;
@@ -45,7 +45,8 @@ function describe(job, built, total, isMerged) {
   const state = stateText(job.state);
   if (hasEnded(job.state))
     return `${titleText(job)} is ${state} and has no result. The picture shows its built part.`;
-  if (isMerged) return `${state}: all voxels are built. Their colors are not ready yet.`;
+  if (isMerged)
+    return `${state}: all voxels are built. Their colors or other attributes are not ready yet.`;
   const count = `${countText(built)} of ${countText(total)} occupied subvolumes are built`;
   return `${state}: ${count}, drawn coarsely.`;
 }
