@@ -16,6 +16,7 @@
 #include "server/base/json_text.h"
 #include "server/base/request_error.h"
 #include "server/base/time_text.h"
+#include "server/webhooks/certificates.h"
 #include "server/webhooks/webhook_message.h"
 
 namespace voxdag::server {
@@ -86,7 +87,7 @@ Webhooks::Webhooks(const ServerConfig& config, FileSystem& files, JobQueue& queu
                       "': expected http://, because the HTTP library of this build (cpp-httplib) "
                       "has no TLS");
   }
-  if (!options_.ca_file.empty()) files.open_read(options_.ca_file);  // throws if it is missing
+  if (!options_.ca_file.empty()) check_certificates(files, options_.ca_file);
   if (!options_.secret_file.empty()) secret_ = read_secret(files, options_.secret_file);
   // If a backup of the queue was restored, its events have smaller numbers than the last one.
   last_event_ = std::min(store_.last_event(), ended_jobs_.last_number());
@@ -363,8 +364,11 @@ void Webhooks::record(Attempt& attempt) {
   store_.update(changed);
   ++ended_attempts_;
   count_end(changed);
-  if (!changed.error.empty())
-    log_({what + " failed: " + changed.error, LogLevel::kWarning, delivery.job});
+  if (changed.error.empty()) return;
+  const bool is_last = changed.state == DeliveryState::kFailed;
+  log_({what + " failed: " + changed.error +
+            (is_last ? "; the delivery has failed, and there is no further attempt" : ""),
+        is_last ? LogLevel::kError : LogLevel::kWarning, delivery.job});
 }
 
 void Webhooks::count_end(const Delivery& delivery) {

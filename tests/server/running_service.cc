@@ -38,6 +38,7 @@ void RunningService::start() {
   service_ = std::make_unique<Service>(config_, *files_, [this](const LogEntry& entry) {
     std::lock_guard lock(log_mutex_);
     log_ += entry.message + "\n";
+    if (entry.level == LogLevel::kError) error_log_ += entry.message + "\n";
   });
   thread_ = std::thread([this] { service_->run(); });
   http_ = std::make_unique<HttpClient>(ClientOptions{service_->url(), "", "", 300});
@@ -53,6 +54,11 @@ void RunningService::stop() {
 std::string RunningService::log() {
   std::lock_guard lock(log_mutex_);
   return log_;
+}
+
+std::string RunningService::error_log() {
+  std::lock_guard lock(log_mutex_);
+  return error_log_;
 }
 
 std::string RunningService::scene_bytes() {

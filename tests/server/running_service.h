@@ -51,6 +51,8 @@ class RunningService : public testing::Test {
   static std::string not_problem(const ClientResponse& response, int status,
                                  const std::string& code);
   std::string log();
+  // Returns the lines of log() whose level is error.
+  std::string error_log();
 
   TemporaryFolder folder_;
   ServerConfig config_;
@@ -62,7 +64,7 @@ class RunningService : public testing::Test {
   std::unique_ptr<Service> service_;
   std::thread thread_;
   std::mutex log_mutex_;
-  std::string log_;
+  std::string log_, error_log_;
 };
 
 // Sends raw bytes and reads until the server closes the connection, or is silent for 30 s.

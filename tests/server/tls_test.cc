@@ -5,6 +5,7 @@
 #include <fstream>
 #include <mutex>
 #include <optional>
+#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -179,9 +180,37 @@ TEST_F(TlsWebhooks, NeedATrustedCertificate) {
   EXPECT_EQ(webhook["status"], nullptr);
   EXPECT_NE(webhook["error"].get<std::string>().find("certificate"), std::string::npos) << webhook;
   EXPECT_TRUE(receiver.received().empty());
-  stop();
-  config_.webhooks.ca_file = folder_.file("none.pem");
-  EXPECT_THROW(start(), Error);
+}
+
+// The service does not start with a file of certificates that it could not use later.
+TEST_F(TlsWebhooks, NeedAFileWithCertificates) {
+  config_.webhooks.ca_file = folder_.file("ca.pem");
+  const auto error = [&] {
+    try {
+      start();
+    } catch (const Error& e) {
+      return e.message();
+    }
+    stop();
+    return std::string();
+  };
+  const auto error_of = [&](const std::string& text) {
+    std::ofstream(config_.webhooks.ca_file) << text;
+    return error();
+  };
+  EXPECT_NE(error(), "") << "there is no file";
+  const std::string expected = "ca.pem: it has no certificate: expected a PEM file with at least";
+  EXPECT_NE(error_of("").find(expected), std::string::npos);
+  EXPECT_NE(error_of("text\n").find(expected), std::string::npos);
+  make_certificate(folder_.file("ca.pem"), folder_.file("key.pem"));
+  EXPECT_EQ(error(), "");
+  std::stringstream certificate, key;
+  certificate << std::ifstream(folder_.file("ca.pem")).rdbuf();
+  key << std::ifstream(folder_.file("key.pem")).rdbuf();
+  EXPECT_NE(error_of(key.str()).find(expected), std::string::npos);
+  EXPECT_EQ(error_of(key.str() + certificate.str()), "");
+  const std::string half = certificate.str().substr(0, certificate.str().size() / 2);
+  EXPECT_NE(error_of(certificate.str() + half).find("OpenSSL cannot read it ("), std::string::npos);
 }
 
 }  // namespace

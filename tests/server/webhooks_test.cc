@@ -238,7 +238,14 @@ TEST_F(WebhookService, RetriesUntilAReceiverAccepts) {
   EXPECT_EQ(webhook["status"], 500);
   EXPECT_EQ(webhook["error"], "status 500: expected 200 to 299");
   EXPECT_EQ(receiver_.received().size(), 6u);
-  EXPECT_NE(log().find("attempt 3 of 3 failed: status 500"), std::string::npos) << log();
+  const std::string ended = "; the delivery has failed, and there is no further attempt\n";
+  EXPECT_NE(error_log().find("attempt 3 of 3 failed: status 500: expected 200 to 299" + ended),
+            std::string::npos)
+      << log();
+  EXPECT_NE(log().find("attempt 2 of 3 failed: status 500: expected 200 to 299\n"),
+            std::string::npos)
+      << log();
+  EXPECT_EQ(error_log().find("attempt 2 of 3"), std::string::npos);
   const std::string metrics = http_->get("/metrics").body;
   for (const char* line :
        {"voxdag_webhook_pending_deliveries 0\n", "voxdag_webhook_attempts_total 6\n",
