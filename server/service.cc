@@ -58,12 +58,16 @@ void remove_plans(FileSystem& files, const ServerConfig& config) {
 }
 
 // Returns the path of a request for the log. Percent-encodes all bytes except visible ASCII
-// characters, so that a path cannot write control codes of a terminal to the log.
+// characters, so that a path cannot write control codes of a terminal to the log. Cuts the text
+// after kMaxLoggedChars characters and appends "...".
 std::string shown(const std::string& path) {
   std::string text;
-  for (const char c : path.substr(0, kMaxLoggedChars)) {
+  for (const char c : path) {
     const auto byte = static_cast<unsigned char>(c);
-    text += byte > ' ' && byte < 0x7f ? std::string(1, c) : "%" + hex_text({&byte, 1});
+    const bool is_visible = byte > ' ' && byte < 0x7f;
+    const std::string piece = is_visible ? std::string(1, c) : "%" + hex_text({&byte, 1});
+    if (text.size() + piece.size() > kMaxLoggedChars) return text + "...";
+    text += piece;
   }
   return text;
 }
@@ -85,7 +89,12 @@ Service::Service(ServerConfig config, FileSystem& files, Log log)
       tasks_(config_, scenes_),
       http_(
           config_.http, [this](Request& request) { return answer(request); },
-          [this](int status) { metrics_.count_request(status, 0); }),
+          [this](const Request* request, int status) {
+            if (request)
+              record(*request, status);
+            else
+              metrics_.count_request(status, 0);
+          }),
       webhooks_(config_, files, queue_, log_),
       dispatcher_(config_, files, queue_, tasks_, disk_, log_,
                   [this](const Job& job) { metrics_.count_run(job); }),
@@ -163,7 +172,6 @@ void Service::clean_up_periodically() {
 }
 
 Response Service::answer(Request& request) {
-  const double start_s = wall_seconds();
   Response response;
   try {
     if (config_.before_step) config_.before_step("answer " + request.method);
@@ -192,12 +200,11 @@ Response Service::answer(Request& request) {
     log_({"request " + request.id + " " + request.method +
               ": the OpenAPI document lacks the status " + std::to_string(response.status),
           LogLevel::kError});
-  record(request, response.status, start_s);
   return response;
 }
 
-void Service::record(const Request& request, int status, double start_s) {
-  const double duration_s = wall_seconds() - start_s;
+void Service::record(const Request& request, int status) {
+  const double duration_s = wall_seconds() - request.begin_s;
   metrics_.count_request(status, duration_s);
   const bool is_read =
       request.method == "GET" || request.method == "HEAD" || request.method == "OPTIONS";

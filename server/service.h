@@ -37,8 +37,9 @@ class Service {
   // Runs until the service stops.
   void clean_up_periodically();
   Response answer(Request& request);
-  // Counts the request. Logs it, unless it only reads and there is no access log.
-  void record(const Request& request, int status, double start_s);
+  // Counts the request, whose answer has this status. Logs it, unless it only reads and there is no
+  // access log.
+  void record(const Request& request, int status);
 
   const ServerConfig config_;
   FileSystem& files_;

@@ -12,15 +12,16 @@ namespace {
 
 constexpr size_t kMaxMessageBytes = 8192;
 constexpr size_t kMaxWordBytes = 256;
+constexpr size_t kMaxContinuationBytes = 3;  // of a character in UTF-8
 
-// Returns the text on one printable line, cut between two characters if it is longer than `most`
-// bytes.
-std::string bounded(const std::string& text, size_t most) {
-  std::string line = printable_line(std::string_view(text).substr(0, most + 4));
-  if (line.size() <= most) return line;
+// Returns the text on one printable line. If it is longer than `most` bytes, cuts it between two
+// characters and appends "...".
+std::string bounded(std::string_view text, size_t most) {
+  if (text.size() <= most) return printable_line(text);
+  const size_t least = most - kMaxContinuationBytes;
   size_t end = most;
-  while (end > 0 && (static_cast<unsigned char>(line[end]) & 0xc0) == 0x80) --end;
-  return line.substr(0, end) + "...";
+  while (end > least && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  return printable_line(text.substr(0, end)) + "...";
 }
 
 std::string json_line(const LogEntry& entry, double unix_s) {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <ctime>
 
+#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/io/random_id.h"
 #include "server/http/message/problem.h"
@@ -58,6 +59,7 @@ Request& Exchange::read_request(size_t max_header_bytes) {
   head_ = parse_request_head(read_head(max_header_bytes));
   connection_.begin_exchange();
   body_.emplace(connection_, head_);
+  request_.begin_s = wall_seconds();
   request_.method = head_.method;
   request_.target = parse_target(head_.target);
   request_.headers = std::move(head_.headers);
@@ -97,7 +99,8 @@ std::string Exchange::read_head(size_t max_bytes) {
   }
 }
 
-bool Exchange::answer(Response response, bool last) {
+bool Exchange::answer(Response response, bool last,
+                      const std::function<void(int status)>& on_status) {
   if (response.body.capacity() > kSmallAnswerBytes) response.body.shrink_to_fit();
   const size_t bytes = memory_of(response);
   const bool reserves = bytes > kSmallAnswerBytes;
@@ -105,6 +108,7 @@ bool Exchange::answer(Response response, bool last) {
     response = problem_response(
         busy("too many large answers are being sent: expected the request again later"));
   response.build_permit.reset();
+  on_status(response.status);
   const bool keep_alive = !last && head_.keep_alive && body_ && body_->is_complete();
   const bool sent = send(response, answer_head(response, keep_alive));
   response = {};

@@ -1,6 +1,7 @@
 // One request and its answer on a connection. Used by one thread.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -18,9 +19,10 @@ class Exchange {
   // Reads the head of the request. Request::read_body reads the body. Throws Problem if the head is
   // malformed, too large or too slow, or has a Content-Encoding.
   Request& read_request(size_t max_header_bytes);
-  // Sends the answer. `last` is true if the server accepts no further request on the connection.
-  // Returns true if another request can follow on the connection.
-  bool answer(Response response, bool last);
+  // Sends the answer, or the problem 503 if there is no memory for it. `last` is true if the server
+  // accepts no further request on the connection. Calls `on_status` with the status of the answer
+  // before its first byte is sent. Returns true if another request can follow on the connection.
+  bool answer(Response response, bool last, const std::function<void(int status)>& on_status);
 
  private:
   std::string read_head(size_t max_bytes);

@@ -36,10 +36,10 @@ void send_busy(int socket) {
 
 class HttpServer::Engine {
  public:
-  Engine(const HttpOptions& options, HttpServer::Handler handler, HttpServer::OnRefused on_refused)
+  Engine(const HttpOptions& options, HttpServer::Handler handler, HttpServer::OnAnswer on_answer)
       : limits_(options.limits),
         handler_(std::move(handler)),
-        on_refused_(std::move(on_refused)),
+        on_answer_(std::move(on_answer)),
         listener_(options.address, options.port),
         table_(limits_) {
     if (!options.certificate_file.empty()) tls_.emplace(options.certificate_file, options.key_file);
@@ -100,19 +100,22 @@ class HttpServer::Engine {
     for (size_t served = 1; !draining_; ++served) {
       if (!connection.wait_for_request()) return;
       Exchange exchange(connection, address);
-      Response response = respond(exchange);
-      if (!exchange.answer(std::move(response), served == limits_.max_requests || draining_)) break;
+      const Request* request = nullptr;
+      Response response = respond(exchange, request);
+      const bool last = served == limits_.max_requests || draining_;
+      const auto on_status = [&](int status) { on_answer_(request, status); };
+      if (!exchange.answer(std::move(response), last, on_status)) break;
     }
     connection.linger();
   }
 
-  Response respond(Exchange& exchange) {
-    Request* request = nullptr;
+  // Sets `request` when the handler is called.
+  Response respond(Exchange& exchange, const Request*& request) {
     try {
-      request = &exchange.read_request(limits_.max_header_bytes);
-      return handler_(*request);
+      Request& read = exchange.read_request(limits_.max_header_bytes);
+      request = &read;
+      return handler_(read);
     } catch (const Problem& problem) {
-      if (!request) on_refused_(problem.status);
       return problem_response(problem);
     } catch (const std::exception&) {
       return problem_response(Problem(500, "internal", "internal error"));
@@ -121,7 +124,7 @@ class HttpServer::Engine {
 
   const HttpLimits limits_;
   const HttpServer::Handler handler_;
-  const HttpServer::OnRefused on_refused_;
+  const HttpServer::OnAnswer on_answer_;
   Listener listener_;
   std::optional<TlsContext> tls_;
   ConnectionTable table_;
@@ -131,8 +134,8 @@ class HttpServer::Engine {
   std::unique_ptr<ThreadPool> threads_ = std::make_unique<ThreadPool>();
 };
 
-HttpServer::HttpServer(const HttpOptions& options, Handler handler, OnRefused on_refused)
-    : engine_(std::make_unique<Engine>(options, std::move(handler), std::move(on_refused))) {}
+HttpServer::HttpServer(const HttpOptions& options, Handler handler, OnAnswer on_answer)
+    : engine_(std::make_unique<Engine>(options, std::move(handler), std::move(on_answer))) {}
 HttpServer::~HttpServer() = default;
 int HttpServer::port() const { return engine_->port(); }
 size_t HttpServer::connections() const { return engine_->connections(); }

@@ -24,12 +24,15 @@ class HttpServer {
   // Answers a request. May throw Problem. If it throws another exception, the answer is the problem
   // `internal`.
   using Handler = std::function<Response(Request&)>;
-  // Called with the status of an answer to a malformed request. Such a request reaches no handler.
-  using OnRefused = std::function<void(int status)>;
+  // Called with the status of each answer, before the answer is sent. The status can differ from
+  // the status that the handler returned: it is 503 if there is no memory for the answer. `request`
+  // is null if the handler was not called, because the head of the request is malformed, too large
+  // or too slow, or has a Content-Encoding.
+  using OnAnswer = std::function<void(const Request* request, int status)>;
 
   // Listens, but does not accept connections yet. Throws like Listener and TlsContext.
   HttpServer(
-      const HttpOptions& options, Handler handler, OnRefused on_refused = [](int) {});
+      const HttpOptions& options, Handler handler, OnAnswer on_answer = [](const Request*, int) {});
   ~HttpServer();
 
   int port() const;

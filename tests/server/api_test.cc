@@ -463,6 +463,11 @@ TEST_F(Api, WritesAnAccessLog) {
       << text;
   EXPECT_NE(text.find("access GET /none%20access%20GET status=404 who="), std::string::npos)
       << text;
+  http_->get("/" + std::string(198, 'a') + "\x80");
+  http_->get("/" + std::string(199, 'b'));
+  const std::string cut = "access GET /" + std::string(198, 'a') + "... status=";
+  EXPECT_NE(log().find(cut), std::string::npos) << log();
+  EXPECT_NE(log().find("GET /" + std::string(199, 'b') + " status="), std::string::npos) << log();
 }
 
 // Errors of jobs name options as the members of the request, not as the command line spells them.

@@ -24,6 +24,7 @@ struct Request {
   Target target;
   HeaderMap headers;
   std::string peer;    // the client's address
+  double begin_s = 0;  // wall_seconds() when the head was read
   std::string id;      // X-Request-Id of the answer, also in the log
   std::string caller;  // name of the caller's token, once it is known
   std::optional<uint64_t> content_length;

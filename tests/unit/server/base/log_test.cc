@@ -57,5 +57,16 @@ TEST(Log, IsPrintableAndBounded) {
   EXPECT_TRUE(nlohmann::json::parse(log_line(LogFormat::kJson, message, kTimeS)).is_object());
 }
 
+// A cut is always marked, also if the printable text is much shorter than the text.
+TEST(Log, MarksCuts) {
+  std::string controls;
+  for (int i = 0; i < 3000; ++i) controls += "\u202e";
+  const std::string message = printable_entry(controls + "the end").message;
+  EXPECT_EQ(message, std::string(8192 / 3, '?') + "...");
+  EXPECT_EQ(printable_entry(std::string(9000, '\x80')).message, std::string(8189, '?') + "...");
+  EXPECT_EQ(printable_entry(std::string(8192, 'x')).message, std::string(8192, 'x'));
+  EXPECT_EQ(printable_entry(std::string(8193, 'x')).message, std::string(8192, 'x') + "...");
+}
+
 }  // namespace
 }  // namespace voxdag::server

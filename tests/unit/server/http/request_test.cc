@@ -158,7 +158,9 @@ class Client {
   void send_more(const std::string& bytes) {
     send(ends_[1], bytes.data(), bytes.size(), MSG_NOSIGNAL);
   }
-  bool answer(Response response) { return exchange_->answer(std::move(response), false); }
+  bool answer(Response response) {
+    return exchange_->answer(std::move(response), false, [](int) {});
+  }
   // Returns all bytes that the server has sent to the client since the last call.
   std::string received() {
     std::string text(1 << 16, '\0');
