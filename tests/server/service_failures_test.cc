@@ -82,7 +82,7 @@ TEST_F(ServiceFailures, NoFailureEndsTheService) {
   }));
   stop();
   for (const char* step :
-       {"recover the jobs", "dispatch jobs", "end the threads of jobs", "start jobs", "run ID",
+       {"recover the jobs", "dispatch jobs", "end the threads of jobs", "start jobs", "run job ID",
         "record how job ID ended", "remove the work folder of job ID", "draw a preview",
         "record a preview", "remove old jobs", "remove old uploads", "restore the ballast",
         "answer PUT", "answer POST", "answer GET", "answer DELETE"})
