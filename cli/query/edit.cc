@@ -99,10 +99,11 @@ class Edit {
       return query::combine(file, *other, spec_, files_, *progress_, context_.cancel);
     });
   }
-  // Builds the scenes of --add as one DAG, with the grid and the attributes of the edited file, and
-  // writes it to scenes_path().
+  // Builds the scenes of --add as one DAG, with the grid and the attributes of the input, and
+  // writes it to scenes_path(). Cuts do not change the grid, but a file from which all voxels are
+  // cut has no attributes.
   void build_scenes() {
-    const auto file = open_global_file(current_);
+    const auto file = open_global_file(command_.input);
     BuildSpec build;
     build.geometry.scenes = command_.scenes;
     build.geometry.resolution = static_cast<uint64_t>(file->resolution());

@@ -21,6 +21,7 @@
 #include "query/attributes/resident_pages.h"
 #include "query/attributes/stored_section.h"
 #include "query/dag/dag_view.h"
+#include "voxdag/cells.h"
 
 namespace voxdag::query {
 namespace {
@@ -28,7 +29,6 @@ namespace {
 using voxdag_reader::ColorCursor;
 using voxdag_reader::ColorRegion;
 using voxdag_reader::ColorSection;
-using Position = std::array<int64_t, 3>;
 
 // In this file, levels and codes are levels and Morton codes of the result's grid, except where a
 // name begins with `file_`: these are levels and codes of a source's grid. A region is a color

@@ -57,8 +57,8 @@ class RegionMemory {
 template <class Region>
 class RegionBatches {
  public:
-  // `encode` is called on any thread, `write` on the thread that calls add() and flush(), in the
-  // order of the calls of add().
+  // `encode` and `write` are called on any thread: `encode` concurrently, `write` one call at a
+  // time and in the order of the calls of add().
   using Encode = std::function<Region(const PlacedCube&)>;
   using Write = std::function<void(const Region&)>;
 

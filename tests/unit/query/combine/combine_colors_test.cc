@@ -7,11 +7,10 @@
 #include "tests/support/error_of.h"
 #include "tests/unit/core/format/color/valued_files.h"
 #include "tests/unit/query/combine/combine_fixture.h"
+#include "voxdag/cells.h"
 
 namespace voxdag::query {
 namespace {
-
-using Position = std::array<int64_t, 3>;
 
 Position position_of(uint64_t code) {
   uint32_t x, y, z;
