@@ -202,7 +202,7 @@ class CombinedColors {
   void start(uint64_t limit_bytes, unsigned workers) {
     std::vector<const voxdag_reader::File*> mapped = {&result_};
     for (const auto& source : sources_) {
-      source->stored().check_index(static_cast<uint32_t>(source->file_level(levels_)));
+      source->stored().check_index(static_cast<uint32_t>(source->file_level(levels_)), cancel_);
       mapped.push_back(&source->stored().file());
     }
     if (tests_b_) mapped.push_back(&moved_b_);

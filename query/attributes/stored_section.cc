@@ -31,22 +31,28 @@ StoredSection::StoredSection(const voxdag_reader::File& file, Attribute attribut
       section_(section_of(file, attribute)),
       source_(files, file, budget) {}
 
-void StoredSection::check_index(uint32_t finest) {
-  std::vector<std::byte> block(CheckedReader::kBlockBytes);
+void StoredSection::check_index(uint32_t finest, const CancelToken& cancel) {
+  constexpr uint64_t kBlockBytes = CheckedReader::kBlockBytes;
+  std::vector<std::byte> block(kBlockBytes);
+  const auto check = [&](uint64_t begin, uint64_t bytes) {
+    for (uint64_t done = 0; done < bytes; done += kBlockBytes) {
+      cancel.check();
+      source_.check(begin + done, std::min(kBlockBytes, bytes - done), block);
+    }
+  };
   for (uint32_t l = 0; l <= std::min(finest, file_.brick_level()); ++l) {
     const voxdag_reader::Level& level = file_.level(l);
-    source_.check(level.file_offset, level.word_count * sizeof(uint32_t), block);
+    check(level.file_offset, level.word_count * sizeof(uint32_t));
   }
   for (uint32_t t = 0; t < section_.tier_count(); ++t) {
     const ColorTier& tier = section_.tier(t);
-    source_.check(offset_of(tier.directory), tier.region_count * color_layout::kRegionEntryBytes,
-                  block);
+    check(offset_of(tier.directory), tier.region_count * color_layout::kRegionEntryBytes);
   }
   // The list of names follows the last directory.
   const ColorTier& last = section_.tier(section_.tier_count() - 1);
   if (traits_.has_names())
-    source_.check(offset_of(last.directory) + last.region_count * color_layout::kRegionEntryBytes,
-                  list_bytes(section_.names()), block);
+    check(offset_of(last.directory) + last.region_count * color_layout::kRegionEntryBytes,
+          list_bytes(section_.names()));
 }
 
 void StoredSection::check_values(uint32_t finest, uint32_t level, uint64_t code) {

@@ -17,6 +17,7 @@
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 #include "query/attributes/checked_reader.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
 
@@ -33,8 +34,8 @@ class StoredSection {
   const voxdag_reader::ColorSection& section() const { return section_; }
 
   // Verifies the data with which values are found: the levels 0 to `finest` of the DAG, the
-  // directories of the regions and the list of names.
-  void check_index(uint32_t finest);
+  // directories of the regions and the list of names. Throws Error{kCanceled}.
+  void check_index(uint32_t finest, const CancelToken& cancel);
   // Verifies the values of a cube, which is at `code` on `level`, and of all its cells down to the
   // level `finest`.
   void check_values(uint32_t finest, uint32_t level, uint64_t code);

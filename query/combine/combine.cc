@@ -156,6 +156,15 @@ NewCounts write_levels(DagInput& a, DagInput& b, NewLevels& levels, const Worksp
   return {{.voxels = total.voxels, .svo_nodes = total.nodes}, writer.dag_nodes()};
 }
 
+// Completes a temporary file and renames it to its path. The folder is not synced, because the file
+// need not survive a crash. Returns the size of the file.
+uint64_t finish_temporary(GlobalFileWriter& out, const VoxelCounts& counts, unsigned threads,
+                          const CancelToken& cancel) {
+  const uint64_t bytes = out.seal(counts, threads, cancel).bytes;
+  out.rename();
+  return bytes;
+}
+
 // Copies the levels of `from` to `out`.
 void copy_levels(DagInput& from, GlobalFileWriter& out) {
   constexpr uint64_t kChunkWords = uint64_t{1} << 16;
@@ -243,8 +252,13 @@ class Combination {
     GlobalFileWriter levels = writer(path);
     CombineReport report = write_voxels(levels);
     if (report.voxels == 0) return report;
+    // From here on, only a file whose attributes are used is read.
+    a_.file().release_pages();
+    b_.file().release_pages();
+    attributes_.b.release_pages();
     report.work_bytes =
-        levels.finish({.voxels = report.voxels, .svo_nodes = report.svo_nodes}).bytes;
+        finish_temporary(levels, {.voxels = report.voxels, .svo_nodes = report.svo_nodes},
+                         work_.spec.threads, cancel_);
     const auto result = open_global_file(path);
     const WatchedFile watched(*result);
     watched.run([&] {
@@ -314,7 +328,8 @@ std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
                      .descend(levels.bricks);
   for (size_t i = 0; i < levels.pairs.size(); ++i)
     levels.joined.push_back(std::make_unique<JoinedLevel>(work.space, work.space));
-  out.finish(write_levels(target, target, levels, work, out, progress).octree);
+  const VoxelCounts counts = write_levels(target, target, levels, work, out, progress).octree;
+  finish_temporary(out, counts, work.spec.threads, cancel);
   return open_global_file(path);
 }
 

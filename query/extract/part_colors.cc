@@ -48,7 +48,7 @@ class PartColors {
   uint32_t region_level(uint32_t tier) const { return finest_of(tier) - depth_of(tier); }
 
   // Verifies the data with which nodes and values are found.
-  void check_index() { stored_.check_index(finest_); }
+  void check_index() { stored_.check_index(finest_, cancel_); }
 
   // Calls visit(cube) for the cube of each region in the part's finest tier, in Morton order.
   template <class Visit>

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/color/color_of.h"
+#include "query/attributes/stored_section.h"
 #include "tests/support/error_of.h"
 #include "tests/unit/core/format/color/valued_files.h"
 #include "tests/unit/query/combine/combine_fixture.h"
@@ -407,6 +408,45 @@ TEST_F(CombineColors, OtherAttributes) {
   EXPECT_EQ(error.message(), path("b") + " has alphas and " + path("a") +
                                  " has none: expected alphas in both files, or --no-attributes to "
                                  "combine only the voxels");
+}
+
+// A cancel also ends the command while it completes a temporary file: the moved file, or the levels
+// of the result. No file remains.
+TEST_F(CombineColors, CancelWhileATemporaryFileIsCompleted) {
+  class CancelAfterMerge : public NoProgress {
+   public:
+    void begin_stage(std::string_view stage, uint64_t, std::string_view) override {
+      stages.emplace_back(stage);
+    }
+    void end_stage() override {
+      if (stages.back() == "merge") cancel.cancel();
+    }
+    CancelToken cancel;
+    std::vector<std::string> stages;
+  };
+  write(6, 6, 6, 6);
+  const auto file_a = open_global_file(path("a")), file_b = open_global_file(path("b"));
+  for (const bool is_moved : {false, true}) {
+    CombineSpec canceled = spec(Operation::kUnion, "c");
+    if (is_moved) canceled.offset = Position{};
+    CancelAfterMerge progress;
+    const Error error = error_of(
+        [&] { combine(*file_a, *file_b, canceled, system_files(), progress, progress.cancel); });
+    EXPECT_EQ(error.code(), ErrorCode::kCanceled);
+    EXPECT_EQ(progress.stages.back(), "merge");
+    expect_files({"a", "b"});
+  }
+}
+
+TEST_F(CombineColors, CancelWhileTheIndexIsChecked) {
+  write(6, 6, 6, 6);
+  const auto file = open_global_file(path("a"));
+  MemoryBudget budget(uint64_t{1} << 30);
+  StoredSection section(*file, Attribute::kColor, system_files(), budget);
+  section.check_index(6, never_);
+  CancelToken canceled;
+  canceled.cancel();
+  EXPECT_EQ(error_of([&] { section.check_index(6, canceled); }).code(), ErrorCode::kCanceled);
 }
 
 // Damage in the colors of either file, and in their directory, is found. No file remains.
