@@ -116,6 +116,7 @@ void plan(BuildJob& job, const PreparedScene& scene) {
     job.clock.finish("estimate");
   job.work.remove_rows();
   job.work.remove_filled();
+  job.work.remove_frame();  // an earlier build may have had another scene
   std::vector<StoredSubvolume> subvolumes(scene.plan.size());
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     subvolumes[i].cube = scene.plan[i].cube;
@@ -272,14 +273,12 @@ VoxelCounts voxel_counts(const BuildReport& report) {
   return {.voxels = report.merge.voxels, .svo_nodes = report.merge.svo_nodes};
 }
 
-// Writes the frame of the levels to the work folder, so that the service can show the levels while
-// the attributes are made. The file is not synced: readers check its checksums.
+// Writes the frame of the levels, so that the service can show the levels while the attributes are
+// made.
 void write_frame(BuildJob& job, const GlobalFileWriter& out) {
   if (!job.spec.geometry.attributes.any() || job.report.merge.voxels == 0) return;
   const GlobalFileFrame frame = out.frame(voxel_counts(job.report));
-  const auto file = job.context.files.create(job.work.frame_path());
-  file->write_at(0, frame.header);
-  file->write_at(frame.header.size(), frame.table);
+  job.work.write_frame(frame.header, frame.table);
 }
 
 // Runs the stages merge and reorder: writes all levels to `out`.

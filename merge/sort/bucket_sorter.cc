@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 
+#include "core/base/host_device.h"
+
 namespace voxdag {
 namespace {
 
@@ -14,14 +16,14 @@ constexpr uint32_t kMaxInsertionRows = 32;
 constexpr size_t kSlicesAhead = 8;
 
 template <class T>
-void prefetch(const T* begin, const T* end) {
+VOXDAG_PREFETCH void prefetch(const T* begin, const T* end) {
   constexpr uintptr_t kLine = 64;
   for (auto p = reinterpret_cast<uintptr_t>(begin) / kLine * kLine;
        p < reinterpret_cast<uintptr_t>(end); p += kLine)
     __builtin_prefetch(reinterpret_cast<const void*>(p));
 }
 
-void prefetch_rows(const HashPartition& partition, size_t bucket, size_t slice) {
+VOXDAG_PREFETCH void prefetch_rows(const HashPartition& partition, size_t bucket, size_t slice) {
   if (slice >= partition.slices().size()) return;
   const uint64_t base = partition.slices()[slice].row_base;
   const RowOffset begin = partition.bucket_begin(bucket, slice);

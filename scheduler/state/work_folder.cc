@@ -224,6 +224,16 @@ void WorkFolder::remove_if_empty(const std::string& folder) {
   }
 }
 
+void WorkFolder::write_frame(std::span<const std::byte> header, std::span<const std::byte> table) {
+  try {
+    const auto file = files_.create(frame_path());
+    file->write_at(0, header);
+    file->write_at(header.size(), table);
+  } catch (const Error&) {
+    remove_frame();
+  }
+}
+
 void WorkFolder::remove_silently(const std::string& path) {
   try {
     if (files_.exists(path)) files_.remove(path);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -96,6 +97,9 @@ class WorkFolder {
   }
   // Removes stored colors. Errors are ignored.
   void remove_colors() { remove_silently(colors_path()); }
+  // Writes the frame of the levels (frame_path()), but does not sync it: readers check its
+  // checksums. Errors are ignored.
+  void write_frame(std::span<const std::byte> header, std::span<const std::byte> table);
   // Removes the frame of the levels (frame_path()). Errors are ignored.
   void remove_frame() { remove_silently(frame_path()); }
   // Removes the levels of a build that reorders them, and the frame. Errors are ignored.

@@ -69,9 +69,10 @@ void JobFolders::clean_up() {
 }
 
 void JobFolders::remove_work(const std::string& id) {
-  const std::string work = of(id).work();
+  const std::string work = of(id).work(), partial = of(id).result() + ".partial";
   steps_.run("stop the cluster's tasks of job " + id, [&] { stop_cluster_tasks(files_, work); });
   remove_tree(files_, work);
+  if (files_.exists(partial)) files_.remove(partial);
 }
 
 void JobFolders::mark(const std::string& id) {

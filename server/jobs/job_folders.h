@@ -29,6 +29,7 @@ class JobFolders {
   void adopt();
   // Removes the work folders of jobs that no longer need them.
   void clean_up();
+  // Removes the work folder of a job and the partial output.
   void remove_work(const std::string& id);
   // Marks the folder of a job, if it has one. From this call on the job counts as being deleted.
   // The call is fast, unless an earlier deletion left files under the marked name.

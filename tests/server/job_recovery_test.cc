@@ -220,6 +220,21 @@ TEST_F(JobRecovery, AJobThatWaitsForAnotherAttemptIsCanceledToo) {
   release();
 }
 
+// The partial output of an interrupted merge can be large.
+TEST_F(JobRecovery, ACanceledJobKeepsNoPartialOutput) {
+  use_program("exec sleep 600");
+  start();
+  const std::string id = posted_job();
+  ASSERT_TRUE(until_state(id, "running"));
+  EXPECT_EQ(act(id, "suspend").status, 202);
+  const std::string partial = data("jobs/" + id + "/result.vdag.partial");
+  write_file_atomically(system_files(), partial, "merged levels");
+  ASSERT_TRUE(until([&] { return log().find("job " + id + " suspended") != std::string::npos; }));
+  EXPECT_TRUE(std::filesystem::exists(partial));
+  EXPECT_EQ(act(id, "cancel").status, 202);
+  EXPECT_TRUE(until([&] { return !std::filesystem::exists(partial); }));
+}
+
 // A job is suspended after its process was requested but before the process runs the job's program.
 // In this time the process has the service's handler of SIGTERM, so the signal alone would be lost.
 // Nevertheless the job stops.

@@ -156,9 +156,10 @@ Problem damaged(const TileSource& dag, const Error& error) {
 }
 
 void expect_unchanged(const TileSource& dag) {
-  dag.expect_readable();
+  // An overwritten file can also be unreadable, because it was truncated first.
   if (dag.was_overwritten())
     throw Problem(410, "gone", "the file was replaced while being read: get the manifest again");
+  dag.expect_readable();
 }
 
 // Calls `answer`. If the file was readable and unchanged during the call, returns the response of

@@ -70,7 +70,8 @@ bool MergedLevels::was_overwritten() const {
       return {};
     }
   };
-  return open(frame_path(folder_)) != identity() && open(folder_.result()).inode != inode_;
+  return open(frame_path(folder_)) != identity() &&
+         open(folder_.result() + ".partial").inode == inode_;
 }
 
 }  // namespace voxdag::server

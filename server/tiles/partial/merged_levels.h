@@ -25,8 +25,9 @@ class MergedLevels : public FileTileSource {
   // Sets the manifest. Call it before other threads use this object.
   void set_manifest(std::string manifest) { manifest_ = std::move(manifest); }
   const std::string& manifest(const CancelToken&) const override { return manifest_; }
-  // True if the frame was changed or removed, unless the job has succeeded: then the mapped levels
-  // are the result's levels.
+  // True if a build can have overwritten the mapped levels: the frame was changed or removed, and
+  // the mapped file is still the partial file. If the mapped file was renamed or removed, for
+  // example because the job has succeeded or was canceled, its levels remain as they are.
   bool was_overwritten() const override;
 
  private:
@@ -35,7 +36,7 @@ class MergedLevels : public FileTileSource {
 
   FileSystem& files_;
   const JobFolder folder_;
-  const uint64_t inode_;  // the partial file's inode, and later the result's
+  const uint64_t inode_;  // inode of the mapped file
   std::string manifest_;
 };
 

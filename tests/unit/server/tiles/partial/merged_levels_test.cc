@@ -111,7 +111,7 @@ TEST_F(MergedLevelsTest, AreTheResultWithoutColors) {
     EXPECT_NO_THROW(tiles->blocks()->expect_intact(words.data(), words.size_bytes())) << level;
   }
   std::filesystem::remove(job_.result());
-  EXPECT_TRUE(tiles->was_overwritten());
+  EXPECT_FALSE(tiles->was_overwritten()) << "a removed file keeps its contents while it is mapped";
 }
 
 TEST_F(MergedLevelsTest, NeedTheFrameOfTheirFile) {
@@ -157,6 +157,17 @@ TEST_F(MergedLevelsTest, NeedTheFrameOfTheirFile) {
     EXPECT_TRUE(damaged->was_overwritten()) << "the merge begins again";
   });
   EXPECT_TRUE(was_called);
+}
+
+// Without a job store, a build starts from the beginning, perhaps with another scene. The frame of
+// an earlier build does not belong to it.
+TEST_F(MergedLevelsTest, FramesOfEarlierBuildsAreRemoved) {
+  const std::string frame = WorkFolder::frame_path(job_.work());
+  std::filesystem::create_directories(job_.work());
+  std::ofstream(frame) << "of an earlier build";
+  interrupted_build();
+  EXPECT_TRUE(std::filesystem::exists(WorkFolder::store_path(job_.work())));
+  EXPECT_FALSE(std::filesystem::exists(frame));
 }
 
 }  // namespace
