@@ -15,8 +15,8 @@ namespace {
 constexpr size_t kTriangles = 1024;
 constexpr int kTileVoxels = 1 << kTileLog2;
 
-// Returns random triangles with one vertex in the tile at the origin. Their edges are up to about
-// `edge` and `width` voxels long.
+// Returns random triangles. The first vertex is in the tile at the origin. Along each axis, the
+// second vertex is up to about `edge` voxels from the first, and the third up to about `width`.
 std::vector<NarrowTriangle> triangles(int edge, int width) {
   std::mt19937_64 random(1);
   const auto between = [&](int low, int high) {

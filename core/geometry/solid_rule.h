@@ -70,8 +70,8 @@ struct UnitViews {
     ++corners;
   }
   VOXDAG_HD bool is_inside() const { return (sum < 0 ? -sum : sum) > 3 * corners; }
-  // True if the 6 * corners directions (see above) do not all agree: for example, if some count as
-  // outside and others as inside.
+  // True if the sum shows that the 6 * corners directions (see above) do not all agree. For
+  // example, some count as outside and others as inside.
   VOXDAG_HD bool is_disputed() const { return sum % (6 * corners) != 0; }
 };
 

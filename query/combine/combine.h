@@ -50,8 +50,8 @@ struct CombineSpec {
   // Used if only one of the files has colors: the color of cells in which that file has no voxel.
   std::optional<voxdag_reader::Rgb> fill_color;
   uint64_t memory_bytes = uint64_t{1} << 30;
-  // Threads that encode attributes. With 2 or more, the digest is computed while the file is read
-  // back.
+  // Threads that encode attributes. The finished file is read back to compute its SHA-256. With 2
+  // or more, a background thread computes it for one part while the next part is read.
   unsigned threads = 1;
   // Maximum number of words in a narrow level. A level with more words is wide: pointers into it
   // have 64 bits instead of 32. Tests use a smaller limit.

@@ -92,11 +92,13 @@ void PackageReader::place_blocks(const std::string& directory) {
     const std::string plain =
         gunzip_block(std::string_view(directory).substr(at, page.bytes), kMaxBlockBytes);
     at += page.bytes;
-    if (plain.size() != kDirectoryEntryBytes * count + kCodeBytes * colored)
+    const uint64_t expected = kDirectoryEntryBytes * count + kCodeBytes * colored;
+    if (plain.size() != expected)
       throw Error(ErrorCode::kCorrupt, "page " + std::to_string(first / kPageBlocks) + " has " +
                                            std::to_string(plain.size()) +
-                                           " bytes, expected the entries of " +
-                                           std::to_string(count) + " blocks");
+                                           " bytes after decompression, expected " +
+                                           std::to_string(expected) + ", the bytes of " +
+                                           std::to_string(count) + " entries");
     size_t low = kDirectoryEntryBytes * count, high = low + 4 * colored;
     for (uint64_t i = 0; i < count; ++i, ++in_pack) {
       if (in_pack == index_.packs[pack].blocks) {

@@ -21,7 +21,9 @@ struct ReorderSpec {
   std::string output;
   bool replace = false;  // replace an existing file
   uint64_t memory_bytes = uint64_t{1} << 30;
-  unsigned threads = 1;  // with 2 or more, the digest is computed while the output is read back
+  // The finished file is read back to compute its SHA-256. With 2 or more threads, a background
+  // thread computes it for one part while the next part is read.
+  unsigned threads = 1;
   // Maximum number of words in a narrow level. A level with more words is wide: pointers into it
   // have 64 bits instead of 32. Tests use a smaller limit.
   uint64_t narrow_words = global_layout::kNarrowLevelWords;

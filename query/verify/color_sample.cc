@@ -177,6 +177,20 @@ ColorGrid sampled_grid(const voxdag_reader::File& file) {
   return {file.grid_levels(), levels};
 }
 
+// Throws Error{kCorrupt} if the file's list of materials is not `expected`, the scene's list.
+void compare_materials(const voxdag_reader::File& file, const std::vector<std::string>& expected) {
+  const std::vector<std::string> names = file.material_names();
+  if (names.size() != expected.size())
+    throw Error(ErrorCode::kCorrupt, file.path() + ": its list of materials has " +
+                                         std::to_string(names.size()) + " names, expected " +
+                                         std::to_string(expected.size()) + ", as in the scene");
+  for (size_t i = 0; i < names.size(); ++i)
+    if (names[i] != expected[i])
+      throw Error(ErrorCode::kCorrupt, file.path() + ": material " + std::to_string(i) +
+                                           " of its list is '" + names[i] + "', expected '" +
+                                           expected[i] + "', as in the scene");
+}
+
 }  // namespace
 
 ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const Grid& snap,
@@ -191,12 +205,7 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
   find_surfaces(scene, snap, grid, regions, charge, progress, cancel);
   SceneMaterials materials = scene.materials();
   materials.name_unlisted();
-  if (attributes.have_names() && file.material_names() != materials.names)
-    throw Error(ErrorCode::kCorrupt, file.path() + ": its list of materials (" +
-                                         std::to_string(file.material_names().size()) +
-                                         ") differs from the scene's list (" +
-                                         std::to_string(materials.names.size()) +
-                                         ") in number, names or order");
+  if (attributes.have_names()) compare_materials(file, materials.names);
   if (cutouts) materials = with_separate_images(std::move(materials), *cutouts);
   if (!attributes.use_images()) materials.drop_images();
   progress.begin_stage("images", materials.images.size(), "images");

@@ -21,9 +21,11 @@ void stop_with(CommandRunner& commands, FileSystem& files, const std::string& wo
   // A running merge job would resubmit the stopped tasks.
   const bool is_merge_stopped = is_merge_job || stop_merge_job(files, work_folder, commands);
   if (!Slurm(commands, never).cancel(state->task_name()) || !is_merge_stopped)
-    throw Error(ErrorCode::kIo, "the tasks may still run: expected 'scancel --name=" +
-                                    (is_merge_job ? "" : state->merge_job_name() + ",") +
-                                    state->task_name() + "' to succeed");
+    throw Error(ErrorCode::kIo,
+                work_folder +
+                    ": scancel failed, so the tasks may still run: expected 'scancel --name=" +
+                    (is_merge_job ? "" : state->merge_job_name() + ",") + state->task_name() +
+                    "' to succeed");
 }
 
 }  // namespace

@@ -340,7 +340,7 @@ TEST_F(ServiceExports, LeaveTheReservedDiskSpaceFree) {
   EXPECT_EQ(failed["state"], "failed");
   EXPECT_EQ(failed["error"]["code"], "no_space") << failed.dump(2);
   EXPECT_EQ(not_problem(post(exports_of(id), {{"to", "npz"}}), 507, "no_space"), "");
-  size_t files = 0;  // the record, the log, the task and the link to the result
+  size_t files = 0;  // not counting the record, the log, the task and the link to the result
   for (const auto& entry : std::filesystem::directory_iterator(folder_of(path)))
     files += entry.path().string().find(".npz") != std::string::npos;
   EXPECT_EQ(files, 0u);

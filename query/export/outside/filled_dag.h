@@ -17,10 +17,10 @@ namespace voxdag::query {
 
 class FilledDag {
  public:
-  // Fills the cells of the grid with 2^grid_levels cells per edge: the grid of `dag`, or a coarser
-  // grid. `dag` must not be empty. `path` is the name of the file in messages. Throws
-  // Error{kOutOfMemory} if the copy does not fit in the budget, Error{kCorrupt} if words of a level
-  // are not nodes, and Error{kCanceled}.
+  // Makes the filled copy in the grid that has 2^grid_levels cells per edge. This is the grid of
+  // `dag` or a coarser one. `dag` must not be empty. `path` is the name of the file in messages.
+  // Throws Error{kOutOfMemory} if the copy does not fit in the budget, Error{kCorrupt} if words of
+  // a level are not nodes, and Error{kCanceled}.
   FilledDag(const DagView& dag, uint32_t grid_levels, const std::string& path, MemoryBudget& budget,
             const CancelToken& cancel);
   const DagView& view() const { return *view_; }

@@ -33,7 +33,8 @@ class JsonElement {
       : value_(value), key_(section), index_(index), uri_(&uri) {}
 
   const Json& value() const { return value_; }
-  // Returns the name of the root's section, or the name of the member in the parent object.
+  // Returns the name of the section for a section of the root and for its elements, and the name of
+  // the member for a member of an object. Returns "" for an element of another array.
   std::string_view key() const { return key_; }
   bool is_in_array() const { return index_ != kNoIndex; }
   const RawString& uri() const { return *uri_; }

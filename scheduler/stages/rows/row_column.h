@@ -74,7 +74,8 @@ class RowColumn {
   int32_t corner(const Cube& cube, int c) const;
 
  private:
-  // Calls visit(index in a cube's numbers, index in the column's rows) for all rows of the cube.
+  // Calls visit(i, at) for each row of the cube. `i` is the row's index in the cube's vector
+  // (`numbers` or `views`), and `at` is its index in the vectors of this column.
   template <class Visit>
   void for_each_row(const Cube& cube, Visit visit) const;
   size_t tile_index(int first, int second) const;

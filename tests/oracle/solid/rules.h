@@ -15,9 +15,10 @@ enum class SolidRule { kWinding, kParity, kEnclosed };
 struct Solid {
   Voxels voxels;          // the shell and the interior
   uint64_t interior = 0;  // voxels that are not in the shell
-  // rows: sample rows (docs/solid.md) with a crossing. open_rows: rows whose signs do not sum to 0.
-  // odd_rows: rows with an odd number of crossings. disputed: interior voxels of units (rules.cc)
-  // whose directions do not all agree. All four are 0 for kEnclosed.
+  // rows: sample rows (docs/solid.md) with a crossing. open_rows: rows on which the signs of
+  // the crossings do not sum to 0. odd_rows: rows with an odd number of crossings. disputed: voxels
+  // of filled units whose sum of views is not a multiple of 6 * points (Unit in rules.cc). All four
+  // are 0 for kEnclosed.
   uint64_t rows = 0, open_rows = 0, odd_rows = 0, disputed = 0;
 };
 

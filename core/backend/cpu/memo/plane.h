@@ -110,8 +110,8 @@ struct PlaneRange {
   }
 };
 
-// Returns a brick's mask: the voxels that a plane with offset f from the brick sets, and all voxels
-// of the inner sides.
+// Returns a brick's mask. It has the voxels that a plane sets if the plane's offset from the brick
+// is f, and all voxels of the inner sides.
 inline uint64_t plane_brick(const Plane& plane, int64_t f, InnerSides inner = {}) {
   const PlaneRange crossed = PlaneRange(plane.up, plane.width, f).with(inner);
   uint64_t mask = 0;

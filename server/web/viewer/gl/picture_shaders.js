@@ -462,7 +462,7 @@ uniform int u_block;
 uniform ivec2 u_sample;
 layout(location = 0) out uvec4 o_feedback;
 ${kReflected}
-const float kShadowPixels = 0.25;  // weight of tiles that only shadows need
+const float kShadowPixels = 0.25;  // width of a cell if only a shadow's ray misses its tile
 
 void main() {
   ivec2 first = ivec2(gl_FragCoord.xy) * u_block, last = u_size - 1;

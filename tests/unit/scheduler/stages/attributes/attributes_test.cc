@@ -97,8 +97,7 @@ TEST_F(Attributes, AreThoseOfTheScene) {
   EXPECT_GT(sample.cells, 1000u);
 }
 
-// The section of an attribute in the file has the same bytes whichever other attributes are built,
-// and the levels are the same for all attributes.
+// The section of an attribute has the same bytes whichever other attributes the file has.
 TEST_F(Attributes, AreIndependent) {
   build(spec(64, 64, kAll));
   std::string sections[5];
