@@ -81,7 +81,7 @@ def check_retries(visitor, server, job, camera, other_scene):
 def check_many(visitor, server, data):
     """Beyond the limit of viewed jobs, one more is described in text until another one closes."""
     job = Job(server, 4 * RESOLUTION, subvolume=SUBVOLUME, threads=1)
-    job.until("the subvolumes are planned", job.subvolumes)
+    job.until("its plan is stored", (data / "jobs" / job.id / "work" / "job.db").exists)
     job.signal(signal.SIGSTOP)
     try:
         others = [Job(server, 4 * RESOLUTION) for _ in range(MANY)]
