@@ -184,7 +184,7 @@ def check_growing(visitor, server):
 def check_ends(visitor, server):
     """Jobs that are canceled and deleted while they are viewed, and a waiting job."""
     page = visitor.page
-    job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
+    job = Job(server, 2 * RESOLUTION, subvolume=SUBVOLUME, threads=1)
     job.until("its plan can be read", lambda: job.durable()[1] > 0)
     job.signal(signal.SIGSTOP)
     try:
