@@ -100,29 +100,34 @@ VOXDAG_SLICES_INLINE void move_down(const Words& in, Words& out) {
   }
 }
 
+// Adds to `reached` the voxels of `moved` that are free.
+VOXDAG_SLICES_INLINE void add_free(Words& reached, const Words& free, const Words& moved) {
+  reached.low |= free.low & moved.low;
+  reached.high |= free.high & moved.high;
+}
+// Keeps the voxels of `free` that are in `moved`, too.
+VOXDAG_SLICES_INLINE void keep_common(Words& free, const Words& moved) {
+  free.low &= moved.low;
+  free.high &= moved.high;
+}
+
 // Extends `reached` through empty voxels in both directions along x, from lane to lane.
 VOXDAG_SLICES_INLINE void fill_lanes(Words& reached, const Words& empty) {
   Words up = reached, up_free = empty, down = reached, down_free = empty, moved;
   move_up<1>(up, moved);
-  up.low |= up_free.low & moved.low;
-  up.high |= up_free.high & moved.high;
+  add_free(up, up_free, moved);
   move_up<1>(up_free, moved);
-  up_free.low &= moved.low;
-  up_free.high &= moved.high;
+  keep_common(up_free, moved);
   move_up<2>(up, moved);
-  up.low |= up_free.low & moved.low;
-  up.high |= up_free.high & moved.high;
+  add_free(up, up_free, moved);
   move_up<2>(up_free, moved);
   up.high |= up_free.high & moved.high & up.low;
   move_down<1>(down, moved);
-  down.low |= down_free.low & moved.low;
-  down.high |= down_free.high & moved.high;
+  add_free(down, down_free, moved);
   move_down<1>(down_free, moved);
-  down_free.low &= moved.low;
-  down_free.high &= moved.high;
+  keep_common(down_free, moved);
   move_down<2>(down, moved);
-  down.low |= down_free.low & moved.low;
-  down.high |= down_free.high & moved.high;
+  add_free(down, down_free, moved);
   move_down<2>(down_free, moved);
   down.low |= down_free.low & moved.low & down.high;
   reached.low = up.low | down.low;
