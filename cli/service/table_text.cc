@@ -7,36 +7,19 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <string_view>
+
+#include "core/base/text/utf8.h"
 
 namespace voxdag::cli {
 namespace {
 
 constexpr const char* kEllipsis = "\xe2\x80\xa6";
 
-// Returns the length of the character that begins at `at`: one byte, and all bytes that continue
-// it.
-size_t length_at(const std::string& text, size_t at) {
-  constexpr size_t kMaxLength = 4;
-  size_t end = at + 1;
-  while (end < text.size() && end - at < kMaxLength &&
-         (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80)
-    ++end;
-  return end - at;
-}
-
-// Returns the code point of a character. For invalid UTF-8, returns any number.
-uint32_t code_point(const std::string& text, size_t at, size_t length) {
-  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[at + i]); };
-  if (length == 1) return byte(0);
-  uint32_t code = byte(0) & (0xffu >> (length + 1));
-  for (size_t i = 1; i < length; ++i) code = code << 6 | (byte(i) & 0x3fu);
-  return code;
-}
-
 // Returns the number of columns of a character. The ranges are the blocks of Unicode whose
 // characters are mostly wide, and the blocks of combining characters.
-size_t columns_of(uint32_t code) {
-  const auto is_in = [code](uint32_t first, uint32_t last) {
+size_t columns_of(char32_t code) {
+  const auto is_in = [code](char32_t first, char32_t last) {
     return code >= first && code <= last;
   };
   if (is_in(0x300, 0x36f) || is_in(0x200b, 0x200f) || is_in(0xfe00, 0xfe0f)) return 0;
@@ -66,10 +49,10 @@ std::string age_text(const std::string& moment, double now_s) {
 std::string cut_to_columns(const std::string& text, size_t columns) {
   size_t used = 0, cut = 0;  // `cut`: end of the part that fits together with the ellipsis
   for (size_t at = 0; at < text.size();) {
-    const size_t length = length_at(text, at);
-    used += columns_of(code_point(text, at, length));
+    const Character character = first_character(std::string_view(text).substr(at));
+    used += columns_of(character.code);
     if (used > columns) return columns == 0 ? "" : text.substr(0, cut) + kEllipsis;
-    at += length;
+    at += character.bytes;
     if (used < columns) cut = at;
   }
   return text;
