@@ -188,13 +188,13 @@ TEST_F(CacheTest, SurvivesHostileEntries) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   CacheAttack attack(attacked.run.cache_folder, seed);
   uint64_t cached = 0;
-  for (int round = 0; round < 4; ++round) {
+  // A loaded machine can run several builds before the attacking thread gets any CPU time.
+  for (int round = 0; round < 4 || attack.attacks() <= 20 || cached == 0; ++round) {
+    ASSERT_LT(round, 1000) << attack.attacks() << " attacks, " << cached << " cached";
     const BuildReport report = build(attacked);
-    EXPECT_EQ(report.sha256, expected);
+    ASSERT_EQ(report.sha256, expected);
     cached += report.subvolumes_cached;
   }
-  EXPECT_GT(attack.attacks(), 20u);
-  EXPECT_GT(cached, 0u) << "the cache is in use";
 }
 
 }  // namespace
