@@ -93,7 +93,8 @@ class RowTest {
   // Sets the slopes of the triangle's plane. If a row moves by one unit along axis k, the point at
   // which it crosses the plane moves by -slope[k] along the row.
   VOXDAG_HD void slopes(double (&slope)[3]) const {
-    for (int k = 0; k < 3; ++k) slope[k] = static_cast<double>(n_[k]) / static_cast<double>(n_[a_]);
+    const double inverse = 1 / static_cast<double>(n_[a_]);
+    for (int k = 0; k < 3; ++k) slope[k] = static_cast<double>(n_[k]) * inverse;
   }
 
   // True if the triangle crosses the row through p, whose coordinate along the axis is ignored.

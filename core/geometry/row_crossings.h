@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -19,59 +20,67 @@ class FirstBeyond {
   FirstBeyond(const Test& test, const FixedTriangle& t, int axis, int step_log2)
       : triangle_(t),
         axis_(axis),
-        b_((axis + 1) % 3),
-        c_((axis + 2) % 3),
         step_log2_(step_log2),
-        v_b_(t.v[0][b_]),
-        v_c_(t.v[0][c_]) {
+        v_first_(t.v[0][first_row_axis(axis)]),
+        v_second_(t.v[0][second_row_axis(axis)]) {
     // All estimates are in steps. A multiplication by `steps`, a power of two, is exact.
     const double steps = 1 / static_cast<double>(int64_t{1} << step_log2);
+    const int first = first_row_axis(axis), second = second_row_axis(axis);
     double slope[3];
     test.slopes(slope);
-    slope_b_ = slope[b_] * steps;
-    slope_c_ = slope[c_] * steps;
+    slope_first_ = slope[first] * steps;
+    slope_second_ = slope[second] * steps;
     at_v_ = static_cast<double>(t.v[0][axis]) * steps;
-    // The error of the estimate in find(): a slope is rounded up to three times, and the products
+    // The error of the estimate in find(): a slope is rounded up to four times, and the products
     // and sums a few times, each time by at most 2^-53 of a term. Every term is at most about
     // `largest`, so the error is below largest * 2^-49. Half a lattice unit is added as a reserve.
-    const double largest =
-        std::abs(at_v_) + std::abs(slope_b_) * extent(t, b_) + std::abs(slope_c_) * extent(t, c_);
-    margin_ = 0.5 * steps + largest * 0x1p-49;
+    const double largest = std::abs(at_v_) + std::abs(slope_first_) * extent(t, first) +
+                           std::abs(slope_second_) * extent(t, second);
+    margin_ = largest < kMaxEstimate ? 0.5 * steps + largest * 0x1p-49 : 1;
   }
 
-  // Returns the smallest k for which the point k * 2^step_log2 of the row through p is beyond the
-  // row's crossing with the triangle. The triangle must cross the row.
-  int64_t find(const int64_t (&p)[3]) const {
-    const double at = at_v_ - slope_b_ * static_cast<double>(p[b_] - v_b_) -
-                      slope_c_ * static_cast<double>(p[c_] - v_c_);
-    if (at > -kMaxEstimate && at < kMaxEstimate) {
-      const int64_t k = floor_of(at);
-      const double part = at - static_cast<double>(k);
-      if (part > margin_ && part < 1 - margin_) return k + 1;
-    }
-    int64_t k = 0;
-    with_row_test(triangle_, axis_,
-                  [&](const auto& test) { k = test.first_beyond(p[b_], p[c_], step_log2_); });
-    return k;
+  // Selects the rows with the coordinate `at_first` along first_row_axis().
+  void select(int64_t at_first) {
+    at_first_ = at_first;
+    at_line_ = at_v_ - slope_first_ * static_cast<double>(at_first - v_first_);
+  }
+  // Returns the smallest k for which the point k * 2^step_log2 of a row is beyond the row's
+  // crossing with the triangle. `at_second`: the row's coordinate along second_row_axis(). The
+  // triangle must cross the row.
+  int64_t find(int64_t at_second) const {
+    const double at = at_line_ - slope_second_ * static_cast<double>(at_second - v_second_);
+    // The sum has no fraction bits, so its low bits are the integer nearest to `at`.
+    const double sum = at + kRound;
+    const double above = at - (sum - kRound);  // above this integer, between -1/2 and 1/2
+    if (std::abs(above) > margin_)
+      return std::bit_cast<int64_t>(sum) - std::bit_cast<int64_t>(kRound) + (above > 0 ? 1 : 0);
+    return find_exactly(at_second);
   }
 
  private:
+  static constexpr double kRound = 0x1.8p52;
+  // For larger estimates, find() always uses the exact test: its margin is 1.
   static constexpr double kMaxEstimate = 0x1p41;
 
+  [[gnu::noinline]] int64_t find_exactly(int64_t at_second) const {
+    const bool first_is_b = first_row_axis(axis_) == (axis_ + 1) % 3;
+    const int64_t at_b = first_is_b ? at_first_ : at_second;
+    const int64_t at_c = first_is_b ? at_second : at_first_;
+    int64_t k = 0;
+    with_row_test(triangle_, axis_,
+                  [&](const auto& test) { k = test.first_beyond(at_b, at_c, step_log2_); });
+    return k;
+  }
   static double extent(const FixedTriangle& t, int axis) {
     return static_cast<double>(t.high(axis) - t.low(axis));
   }
 
-  // Returns the largest integer <= x.
-  static int64_t floor_of(double x) {
-    const auto truncated = static_cast<int64_t>(x);
-    return truncated - (static_cast<double>(truncated) > x ? 1 : 0);
-  }
-
   const FixedTriangle& triangle_;
-  const int axis_, b_, c_, step_log2_;
-  const int64_t v_b_, v_c_;
-  double at_v_, slope_b_, slope_c_, margin_;
+  const int axis_, step_log2_;
+  const int64_t v_first_, v_second_;
+  double at_v_, slope_first_, slope_second_, margin_;
+  int64_t at_first_ = 0;
+  double at_line_ = 0;
 };
 
 // The sample rows of a closed cube: lattice lines at a distance of 2^pitch_log2 units. The
@@ -96,21 +105,20 @@ struct SampleRows {
     const int64_t base = low[axis] >> pitch_log2;
     const auto visit_rows = [&](const auto& test) {
       if (test.sign() == 0) return;
-      const FirstBeyond first_beyond(test, triangle, axis, pitch_log2);
+      FirstBeyond first_beyond(test, triangle, axis, pitch_log2);
       const bool first_is_c = first == (axis + 2) % 3;
       const int64_t pitch = int64_t{1} << pitch_log2;
       const auto step = test.edge_steps(!first_is_c, pitch);
-      int64_t p[3] = {0, 0, 0};
+      const int64_t from_second = low[second] + s.low * pitch;
       for (int i = f.low; i <= f.high; ++i) {
-        p[first] = low[first] + i * pitch;
-        const int64_t at_second = low[second] + s.low * pitch;
-        auto edges =
-            first_is_c ? test.edges_at(at_second, p[first]) : test.edges_at(p[first], at_second);
-        for (int j = s.low; j <= s.high; ++j) {
-          if ((edges.of[0] | edges.of[1] | edges.of[2]) >= 0) {
-            p[second] = low[second] + j * pitch;
-            visit(i, j, first_beyond.find(p) - 1 - base, test.sign());
-          }
+        const int64_t at_first = low[first] + i * pitch;
+        auto edges = first_is_c ? test.edges_at(from_second, at_first)
+                                : test.edges_at(at_first, from_second);
+        first_beyond.select(at_first);
+        int64_t at_second = from_second;
+        for (int j = s.low; j <= s.high; ++j, at_second += pitch) {
+          if ((edges.of[0] | edges.of[1] | edges.of[2]) >= 0)
+            visit(i, j, first_beyond.find(at_second) - 1 - base, test.sign());
           for (int e = 0; e < 3; ++e) edges.of[e] += step.of[e];
         }
       }

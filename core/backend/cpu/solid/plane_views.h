@@ -31,8 +31,8 @@ class PlaneViews {
   std::optional<Sides> read(const Plane& plane, int64_t f, bool is_turned, const int (&tile)[3]);
   // Returns the plane's inner sides in a cube within a tile, from the views at the corners of the
   // cube's blocks. The triangle covers the cube and is the only triangle in it. `f`: the plane's
-  // offset from the cube. `low` and `edge`: the cube in the tile, in blocks. Returns nullopt as
-  // read() does.
+  // offset from the cube. `low` and `edge`: the cube in the tile, in blocks. Returns nullopt if
+  // views of one side have different classes (TileViews::class_of()), and otherwise as read() does.
   static std::optional<Sides> read_part(const TileViews& views, const Plane& plane, int64_t f,
                                         const int (&low)[3], int edge);
   // Advances the views to the high faces of the tile of the last read().

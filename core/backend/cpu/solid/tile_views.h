@@ -23,9 +23,19 @@ class TileViews {
 
   // Returns the sum of the three views from a corner; coordinates are in blocks.
   int32_t at(int x, int y, int z) const { return views_[x][y][z]; }
-  // Sets the classes of the eight corners of a block, in the order of child indices. The class of a
-  // corner depends on the sum of its three views: 0 if the sum means outside, 4 or -4 if it means
-  // inside and disputed, and otherwise the sum itself.
+  // Returns the class of a corner. `views`: the sum of its three views. If all corners of a unit
+  // have the same class, each of them alone decides as the unit does, also whether it is disputed.
+  //
+  //   0                     |views| <= 3: outside
+  //   views                 otherwise, if `views` is a multiple of 6: inside, not disputed
+  //   6 k + 4, or -6 k - 4  otherwise, with 6 k < |views| < 6 k + 6: inside and disputed
+  static int32_t class_of(int32_t views) {
+    const int32_t size = views < 0 ? -views : views;
+    const int32_t part = size % 6;
+    const int32_t inside = part == 0 ? size : size - part + 4;
+    return size <= 3 ? 0 : views < 0 ? -inside : inside;
+  }
+  // Sets `classes` to class_of() of the eight corners of a block, in the order of child indices.
   void classes_at(const int (&low)[3], int32_t (&classes)[8]) const {
     at_corners(low, classes);
     for (int32_t& views : classes) views = class_of(views);
@@ -39,11 +49,6 @@ class TileViews {
   UnitViews corners_of(const int (&low)[3], int edge) const;
 
  private:
-  static int32_t class_of(int32_t views) {
-    const int32_t disputed = views < 0 ? -4 : 4;
-    const int32_t inside = views > -6 && views < 6 ? disputed : views;
-    return views >= -3 && views <= 3 ? 0 : inside;
-  }
   // Adds the views along an axis, which are in `rows`, to the sums of the corners that are at
   // position k along this axis.
   void add_views(int axis, int k, const int32_t* rows);
