@@ -45,10 +45,10 @@ BuildSpec checked(const BuildSpec& spec) {
   check_backend(r, g.rule());
   if (solid_rule_of(g) != SolidRule::kNone) check_solid(r);
   if (r.report == "none" && r.cluster && r.cluster->merge_job)
-    throw Error(ErrorCode::kInvalidInput,
-                option_text("report", "none") +
-                    ": expected a report with --cluster-merge, because the merge job "
-                    "returns its results in it");
+    throw Error(ErrorCode::kInvalidInput, option_text("report", "none") +
+                                              ": expected a report with " +
+                                              option_text("cluster_merge") +
+                                              ", because the merge job returns its results in it");
   BuildSpec out = spec;
   if (!r.threads) out.run.threads = default_threads();
   if (!r.memory_bytes) out.run.memory_bytes = default_memory();

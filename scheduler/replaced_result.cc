@@ -64,10 +64,11 @@ void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
   const std::string found =
       report ? "is the result of another scene, " + joined(report->scenes)
              : "exists, and no report shows that " + joined(scenes) + " is its scene";
+  const std::string force = option_text("force");
   throw Error(ErrorCode::kInvalidInput,
               "-o " + run.output + ": " + found + ", and would be replaced" +
-                  (report ? " by " + joined(scenes) : "") + ": expected another output; " +
-                  option_text("force") + " replaces it");
+                  (report ? " by " + joined(scenes) : "") + ": expected another output" +
+                  (force.empty() ? "" : "; " + force + " replaces it"));
 }
 
 }  // namespace voxdag

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/io/random_id.h"
 #include "scheduler/slurm/files/batch_file.h"
@@ -140,7 +141,7 @@ void BatchTable::open_batches(CutBatches cut, std::span<const BinId> bins,
     throw Error(ErrorCode::kLimit, "the build needs batch numbers up to " +
                                        std::to_string(state_.next_batch + cut.batches.size() - 1) +
                                        ": expected less than " + std::to_string(kMaxBatches) +
-                                       "; start over (--restart)");
+                                       "; start over with " + option_text("restart"));
   SolidRows* const rows = cluster_.job.rows.get();
   parallel_for(threads, cut.batches.size(), [&](unsigned, size_t i) {
     const Batch& batch = cut.batches[i];

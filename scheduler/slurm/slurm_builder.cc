@@ -9,6 +9,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "scheduler/cluster/cluster.h"
 #include "scheduler/slurm/batch_table.h"
 #include "scheduler/slurm/cluster_context.h"
@@ -141,9 +142,9 @@ void check_cluster_support() {}
 
 void check_cluster(const BuildSpec& spec, const BuildContext& context) {
   if (!spec.run.cache_folder.empty())
-    throw Error(ErrorCode::kInvalidInput,
-                "--cache: tasks of a cluster have no cache: expected "
-                "--cluster without it");
+    throw Error(ErrorCode::kInvalidInput, option_text("cache") +
+                                              ": tasks of a cluster have no cache: expected " +
+                                              option_text("cluster") + " without it");
   const ClusterOptions& options = *spec.run.cluster;
   Slurm slurm(commands_of(spec), context.cancel, options.slurm_start_s);
   const double pause_s = std::min(kFirstQueryPauseS, options.slurm_interval_s);

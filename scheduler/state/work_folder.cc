@@ -99,11 +99,12 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
 
 void WorkFolder::check_is_ours() const {
   const auto refuse = [&](const std::string& name) {
+    const std::string option = option_text("work");
     throw Error(ErrorCode::kInvalidInput,
                 "the work folder " + path_ + " holds " + name +
                     ", which was not created by voxdag: expected an empty "
-                    "folder or the folder of an earlier build (" +
-                    option_text("work") + ")");
+                    "folder or the folder of an earlier build" +
+                    (option.empty() ? "" : " (" + option + ")"));
   };
   for (const DirectoryEntry& entry : files_.list(path_))
     if (!is_ours(entry)) refuse(entry.name);

@@ -8,7 +8,8 @@
 namespace voxdag {
 
 // Spells an option with the given value, or without a value if `value` is empty. The name has
-// underscores, as in JSON. A list of numbers has commas and no spaces: "1,2,3".
+// underscores, as in JSON. A list of numbers has commas and no spaces: "1,2,3". Returns "" if the
+// users cannot set the option. Messages then do not mention it.
 using OptionSpeller = std::string (*)(std::string_view name, std::string_view value);
 
 // "--hash-bits", "--level 11": the spelling of the command line, which is the default.
@@ -21,7 +22,7 @@ std::string spell_as_keyword(std::string_view name, std::string_view value);
 // Sets the speller of this process. Call it before the process starts threads.
 void set_option_speller(OptionSpeller speller);
 
-// Returns the option as the user of this process writes it.
+// Returns the option as the users of this process write it, or "" if they cannot set it.
 std::string option_text(std::string_view name, std::string_view value = {});
 
 }  // namespace voxdag

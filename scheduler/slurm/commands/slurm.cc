@@ -7,6 +7,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 
 namespace voxdag {
 namespace {
@@ -161,16 +162,17 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
       if (option == name || option.starts_with(name + "=") ||
           (name.size() == 2 && option.starts_with(name)))
         throw Error(ErrorCode::kInvalidInput,
-                    "--cluster-options: " + option +
+                    option_text("cluster_options") + ": " + option +
                         " is set by voxdag: expected options such as --partition, --mem, --time "
-                        "(--cluster-running limits how many tasks run at a time)");
+                        "(" +
+                        option_text("cluster_running") + " limits how many tasks run at a time)");
   // sbatch would take the first word that is not an option as a script, and the following words as
   // the script's arguments.
   for (size_t i = 0; i < options.size(); ++i) {
     const bool may_be_value = i > 0 && takes_next_word(options[i - 1]);
     if (!options[i].starts_with('-') && !may_be_value)
-      throw Error(ErrorCode::kInvalidInput,
-                  "--cluster-options: '" + options[i] + "': expected options, which begin with -");
+      throw Error(ErrorCode::kInvalidInput, option_text("cluster_options") + ": '" + options[i] +
+                                                "': expected options, which begin with -");
   }
   std::vector<std::string> command{"sbatch", "--test-only"};
   command.insert(command.end(), options.begin(), options.end());
@@ -184,12 +186,13 @@ void Slurm::check(const std::vector<std::string>& options, double pause_s, Progr
     tested = run(command, "#!/bin/sh\nexit 0\n");
   }
   if (tested.exit_status == 127)
-    throw Error(ErrorCode::kInvalidInput, "--cluster slurm: " + trimmed(tested.error) +
+    throw Error(ErrorCode::kInvalidInput, option_text("cluster", "slurm") + ": " +
+                                              trimmed(tested.error) +
                                               ": expected Slurm's commands on this machine");
   if (tested.exit_status != 0 && !is_unreachable(tested))
     throw Error(ErrorCode::kInvalidInput,
                 "sbatch would refuse the tasks: " + trimmed(tested.error + tested.output) +
-                    ": expected --cluster-options that sbatch accepts");
+                    ": expected " + option_text("cluster_options") + " that sbatch accepts");
 }
 
 std::string Slurm::setting(const std::string& name) {
@@ -257,7 +260,7 @@ std::string Slurm::accepted_job(const CommandResult& submitted) {
                     ? ErrorCode::kIo
                     : ErrorCode::kInvalidInput,
                 "sbatch refused the job: " + trimmed(submitted.error + submitted.output) +
-                    ": expected a job id (check --cluster-options)");
+                    ": expected a job id (check " + option_text("cluster_options") + ")");
   without_nodes_since_s_.reset();
   return job;
 }

@@ -154,8 +154,8 @@ BinnedSurfaces bin_surfaces(TriangleSource& scene, const SurfaceBinning& binning
                 "the scene's triangles differ from the built triangles (digest " +
                     binning.digest.substr(0, 16) + ", now " + digest.hex().substr(0, 16) +
                     "): expected a scene that does not change during the build; start over "
-                    "(" +
-                    option_text("restart") + ")");
+                    "with " +
+                    option_text("restart"));
   return binned;
 }
 

@@ -90,10 +90,11 @@ void BuildJob::commit_best_effort() {
 }
 
 void BuildJob::refuse(const std::string& difference) const {
-  throw Error(ErrorCode::kInvalidInput, "the work folder " + work.path() +
-                                            " holds another job: " + difference +
-                                            "; give another folder (" + option_text("work") +
-                                            ") or start over (" + option_text("restart") + ")");
+  const std::string folder = option_text("work");
+  throw Error(ErrorCode::kInvalidInput,
+              "the work folder " + work.path() + " holds another job: " + difference +
+                  "; start over with " + option_text("restart") +
+                  (folder.empty() ? "" : ", or give another folder with " + folder));
 }
 
 }  // namespace voxdag

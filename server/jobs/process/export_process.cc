@@ -10,15 +10,10 @@
 #include "server/base/json_text.h"
 #include "server/jobs/protocol/export_record.h"
 #include "server/jobs/protocol/export_spec.h"
+#include "server/jobs/protocol/spell_options.h"
 
 namespace voxdag::server {
 namespace {
-
-// Spells an option in the messages of an export. Clients of the API receive these messages. So most
-// options are spelled as members of a request, and --memory as the setting of the service.
-std::string spell_export_option(std::string_view name, std::string_view value) {
-  return name == "memory" ? "exports.memory of the service" : spell_as_member(name, value);
-}
 
 ExportResult write_vdag(FileSystem& files, const voxdag_reader::File& file, const JobTask& task,
                         const ExportSpec& spec, Progress& progress, const CancelToken& cancel) {

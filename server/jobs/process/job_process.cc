@@ -22,6 +22,7 @@
 #include "server/jobs/process/progress_pipe.h"
 #include "server/jobs/protocol/job_request.h"
 #include "server/jobs/protocol/job_task.h"
+#include "server/jobs/protocol/spell_options.h"
 
 namespace voxdag::server {
 namespace {
@@ -122,7 +123,7 @@ std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildCon
 std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progress,
                     const CancelToken& cancel) {
   const JobTask task = read_task(files, folder.task());
-  set_option_speller(&spell_as_member);  // messages reach clients of the API
+  set_option_speller(&spell_job_option);
   link_uploads(task);
   if (task.kind == JobTask::Kind::kExport) return run_export(files, task, progress, cancel);
   ConfinedFiles readable = confined(files, task, folder);
