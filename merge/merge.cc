@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/text.h"
 #include "merge/checkpoint/merge_recovery.h"
 #include "merge/pass/merge_pass.h"
 #include "merge/plan/pending_artifacts.h"
@@ -82,8 +83,8 @@ class Merger {
                       std::string(too_many_rows ? "all subvolumes, any two of which have over 2^32 "
                                                   "rows,"
                                                 : "any two neighboring subvolumes") +
-                      " takes more than " + std::to_string(context_.budget.available()) +
-                      " bytes: expected more memory (" + option_text("memory") + ")");
+                      " takes more than " + size_text(context_.budget.available()) +
+                      ": expected more memory (" + option_text("memory") + ")");
     }
     PassSegment& segment =
         pending_.add_segment(std::make_unique<PassSegment>(context_.scratch, context_.budget));

@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/memory_budget.h"
 #include "core/base/options/option_text.h"
+#include "core/base/text.h"
 
 namespace voxdag {
 
@@ -24,8 +25,8 @@ class GrowingCharge {
   void grow_to(uint64_t bytes) {
     if (bytes <= charge_.bytes() || charge_.try_resize(bytes + kStepBytes)) return;
     throw Error(ErrorCode::kOutOfMemory,
-                "out of memory: " + what_ + " needs over " + std::to_string(bytes) +
-                    " bytes, more than the memory budget has left: expected a larger budget (" +
+                "out of memory: " + what_ + " needs over " + size_text(bytes) +
+                    ", more than the memory budget has left: expected a larger budget (" +
                     option_text("memory") + ")");
   }
   // Charges `bytes` more. The total is the sum of all calls of add().

@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 
 namespace voxdag {
 
@@ -24,9 +25,9 @@ bool is_small(size_t bytes) { return bytes <= kSmallBytes; }
 
 void* check_pages(void* pages, size_t bytes, std::string_view what) {
   if (pages == MAP_FAILED)
-    throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " +
-                                             std::to_string(bytes) + " bytes for " +
-                                             std::string(what) + ": " + errno_text(errno) +
+    throw Error(ErrorCode::kOutOfMemory, "out of memory: the system refused " + size_text(bytes) +
+                                             " for " + std::string(what) + ": " +
+                                             errno_text(errno) +
                                              ": expected more free memory on this machine");
   // Random access to a large table needs far fewer address translations with huge pages. No huge
   // page extends beyond the mapping, so resident memory does not exceed the charge.
@@ -71,8 +72,8 @@ void free_pages(void* pages, size_t bytes) {
 
 void refuse_growth(size_t bytes, std::string_view what) {
   throw Error(ErrorCode::kOutOfMemory,
-              "out of memory: " + std::string(what) + " needs " + std::to_string(bytes) +
-                  " bytes, more than the memory budget has left: expected a larger budget (" +
+              "out of memory: " + std::string(what) + " needs " + size_text(bytes) +
+                  ", more than the memory budget has left: expected a larger budget (" +
                   option_text("memory") + ")");
 }
 

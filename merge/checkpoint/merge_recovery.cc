@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/text.h"
 
 namespace voxdag {
 namespace {
@@ -59,8 +60,8 @@ PassProgress MergeRecovery::resume_final_pass(const FinalPassState& state, Globa
   if (!pending_.fit_at_once(context_.plan.partition_bytes))
     throw Error(ErrorCode::kOutOfMemory,
                 "out of memory: the interrupted merge used more memory than the " +
-                    std::to_string(context_.plan.partition_bytes) +
-                    " bytes that this run has for a part of the merge: expected as much memory as "
+                    size_text(context_.plan.partition_bytes) +
+                    " that this run has for a part of the merge: expected as much memory as "
                     "before (" +
                     option_text("memory") + "), or " + option_text("restart"));
   if (state.narrow_words != out.narrow_words())

@@ -13,6 +13,7 @@
 #include "core/base/memory_budget.h"
 #include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
+#include "core/base/text.h"
 #include "core/dag/consing/consing_memory.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "core/format/artifact/segment_writer.h"
@@ -222,10 +223,9 @@ std::vector<SelectedPart> Extraction::build_part(Worker& worker, const SelectedP
     return {};
   } catch (const OutOfBudget&) {
     if (cube.level == shape_.brick_level())
-      throw Error(ErrorCode::kOutOfMemory, "a brick does not fit a worker's share of " +
-                                               std::to_string(worker.share.limit()) +
-                                               " bytes: expected more memory (" +
-                                               option_text("memory") + ")");
+      throw Error(ErrorCode::kOutOfMemory,
+                  "a brick does not fit a worker's share of " + size_text(worker.share.limit()) +
+                      ": expected more memory (" + option_text("memory") + ")");
     return worker.builder.split(part);
   }
 }

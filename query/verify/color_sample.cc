@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/text.h"
 #include "core/color/blocks/attribute_encoder.h"
 #include "core/color/rule/bake_region.h"
 #include "core/color/snap_surface.h"
@@ -84,8 +85,8 @@ void find_surfaces(TriangleSource& scene, const Grid& snap, const ColorGrid& gri
       if (bytes > charge.bytes() && !charge.try_resize(2 * bytes))
         throw Error(ErrorCode::kOutOfMemory,
                     "out of memory: the triangles of the sampled color regions need over " +
-                        std::to_string(bytes) + " bytes: expected more memory (" +
-                        option_text("memory") + ")");
+                        size_text(bytes) + ": expected more memory (" + option_text("memory") +
+                        ")");
       region.surfaces.push_back(surface);
     }
   };
@@ -228,8 +229,8 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
       if (bytes > values_charge.bytes() && !values_charge.try_resize(bytes))
         throw Error(ErrorCode::kOutOfMemory,
                     "out of memory: the normals and materials of a sampled region need " +
-                        std::to_string(bytes) + " bytes: expected more memory (" +
-                        option_text("memory") + ")");
+                        size_text(bytes) + ": expected more memory (" + option_text("memory") +
+                        ")");
       return true;
     });
     baker.finish(cells, values);

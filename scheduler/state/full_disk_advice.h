@@ -1,9 +1,9 @@
 #pragma once
 
-#include <cmath>
 #include <span>
 #include <string>
 
+#include "core/base/text.h"
 #include "scheduler/state/job_store.h"
 
 namespace voxdag {
@@ -20,8 +20,7 @@ inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, boo
   std::string needed;
   if (built > 0 && bytes > 0) {
     const double artifacts = bytes * (1 + planned / built);
-    const auto megabytes = static_cast<long long>(std::ceil((2 * artifacts - bytes) / 1e6));
-    needed = "about " + std::to_string(megabytes) + " MB of ";
+    needed = "about " + size_text(static_cast<uint64_t>(2 * artifacts - bytes)) + " of ";
     if (has_colors) needed = "the space for colors (voxdag plan estimates it) and " + needed;
   }
   return "; the job is paused: free " + needed + "disk space and run the same command again";

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 
 namespace voxdag::server {
 namespace {
@@ -28,11 +29,10 @@ void DiskSpace::reserve(uint64_t bytes, uint64_t expected) {
   const uint64_t needed = std::max(bytes, expected);
   const uint64_t free_bytes = free(), kept = min_free_bytes_ + reserved_bytes_;
   if (free_bytes < kept + needed)
-    throw Error(ErrorCode::kNoSpace,
-                folder_ + ": the disk has not enough free space for " + std::to_string(needed) +
-                    " more bytes: " + std::to_string(free_bytes) + " bytes are free, expected " +
-                    std::to_string(kept + needed) + ", because " + std::to_string(kept) +
-                    " are reserved");
+    throw Error(ErrorCode::kNoSpace, folder_ + ": the disk has not enough free space for " +
+                                         size_text(needed) + " more: " + size_text(free_bytes) +
+                                         " are free, expected " + size_text(kept + needed) +
+                                         ", because " + size_text(kept) + " are reserved");
   reserved_bytes_ += bytes;
 }
 

@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
+#include "core/fields/field.h"
 #include "scene/formats/formats.h"
 #include "server/base/request_error.h"
 #include "server/jobs/process/confined_files.h"
@@ -75,8 +76,8 @@ JobTask TaskResolver::make(const JobRequest& request, JobTask::Kind kind) {
   task.memory_bytes = memory_of(request);
   if (task.memory_bytes > memory_bytes_)
     throw RequestError(RequestError::Kind::kLimit,
-                       "'memory' is " + std::to_string(task.memory_bytes) +
-                           " bytes: expected at most " + std::to_string(memory_bytes_) +
+                       "'memory' is " + exact_size_text(task.memory_bytes) + ": expected at most " +
+                           exact_size_text(memory_bytes_) +
                            ", the limit for a job of this service");
   task.threads = config_.jobs.threads;
   task.min_free_bytes = config_.jobs.min_free_disk_bytes;

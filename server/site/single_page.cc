@@ -3,6 +3,7 @@
 #include <span>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "query/dag/locked_outputs.h"
 #include "query/dag/temporary_work.h"
 #include "query/package/package_reader.h"
@@ -66,9 +67,9 @@ query::PackageReport write_single_page(const voxdag_reader::File& file, query::P
   spec.output = work.path() + "/package";
   query::PackageReport report = query::write_package(file, spec, {}, files, progress, cancel);
   if (report.bytes > kMaxSinglePageBytes)
-    throw Error(ErrorCode::kLimit, output + ": the package has " + std::to_string(report.bytes) +
-                                       " bytes, expected at most " +
-                                       std::to_string(kMaxSinglePageBytes) + " with --single-file");
+    throw Error(ErrorCode::kLimit, output + ": the package has " + size_text(report.bytes) +
+                                       ", expected at most " + size_text(kMaxSinglePageBytes) +
+                                       " with --single-file");
   try {
     report.bytes = write_page(spec.output, contents, partial, outputs.files(), cancel);
     outputs.files().rename(partial, output);

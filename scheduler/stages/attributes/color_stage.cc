@@ -12,6 +12,7 @@
 #include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
+#include "core/base/text.h"
 #include "core/color/cell_values.h"
 #include "core/format/bytes.h"
 #include "core/format/checksum.h"
@@ -65,12 +66,12 @@ uint64_t count_finest_cells(const ReadableFile& file) {
 void check_list(std::span<const std::string> materials) {
   const uint64_t bytes = list_bytes(materials) + 2 * color_layout::kUnitBytes;
   if (materials.size() > color_layout::kMaxMaterials || bytes > color_layout::kMaxNamesBytes)
-    throw Error(ErrorCode::kLimit,
-                "the scene has " + std::to_string(materials.size()) + " materials, with names of " +
-                    std::to_string(bytes) + " bytes: expected up to " +
-                    std::to_string(color_layout::kMaxMaterials) + " and " +
-                    std::to_string(color_layout::kMaxNamesBytes) + " bytes; leave out " +
-                    option_text("attributes", "material"));
+    throw Error(ErrorCode::kLimit, "the scene has " + std::to_string(materials.size()) +
+                                       " materials, with names of " + size_text(bytes) +
+                                       ": expected up to " +
+                                       std::to_string(color_layout::kMaxMaterials) + " and " +
+                                       size_text(color_layout::kMaxNamesBytes) + "; leave out " +
+                                       option_text("attributes", "material"));
 }
 
 // A thread's objects for baking cubes, and its result for the current cube.

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/text.h"
 #include "core/geometry/morton.h"
 #include "core/geometry/octree_descent.h"
 #include "scheduler/spec/memory_plan.h"
@@ -168,8 +169,8 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
         throw Error(
             ErrorCode::kOutOfMemory,
             "out of memory: the materials of a region of the color grid need more than the " +
-                std::to_string(budget_.available()) +
-                " bytes that are free: expected more memory (" + option_text("memory") +
+                size_text(budget_.available()) + " that are free: expected more memory (" +
+                option_text("memory") +
                 "), fewer "
                 "threads, or a finer color grid (" +
                 option_text("color_resolution") + ")");

@@ -10,6 +10,7 @@
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/text.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "scheduler/solid/full_cubes.h"
 #include "scheduler/solid/part_rows.h"
@@ -206,7 +207,7 @@ class Worker {
       throw Error(ErrorCode::kOutOfMemory,
                   "a subvolume of " + std::to_string(kSmallestEdge) +
                       " voxels per edge does not fit a worker's share of " +
-                      std::to_string(share_.limit()) + " bytes: expected more memory (" +
+                      size_text(share_.limit()) + ": expected more memory (" +
                       option_text("memory") + ")");
     ++counts.split;
     std::optional<SplitSolid> solid;

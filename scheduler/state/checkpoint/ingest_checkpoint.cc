@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include "core/base/background.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/triangles/memory_store.h"
 
@@ -118,12 +118,11 @@ void IngestCheckpoint::check_disk_space(const TriangleSource& scene) const {
   const double memory = triangle_memory(spec_);
   const double free = static_cast<double>(context_.files.free_space(work_.path()));
   if (bytes - memory > free)
-    throw DoesNotFit("the scene has " + std::to_string(scene.declared_triangles()) +
-                     " triangles, which take " + std::to_string(std::llround(bytes / 1e6)) +
-                     " MB until they are built: memory has space for " +
-                     std::to_string(std::llround(memory / 1e6)) + " MB of them, " + work_.path() +
-                     " for " + std::to_string(std::llround(free / 1e6)) +
-                     " MB: expected more free space");
+    throw DoesNotFit(
+        "the scene has " + std::to_string(scene.declared_triangles()) + " triangles, which take " +
+        size_text(static_cast<uint64_t>(bytes)) + " until they are built: memory has space for " +
+        size_text(static_cast<uint64_t>(memory)) + " of them, " + work_.path() + " for " +
+        size_text(static_cast<uint64_t>(free)) + ": expected more free space");
 }
 
 void IngestCheckpoint::enable(const TriangleSource& scene, std::vector<SourceFile> files,

@@ -136,9 +136,8 @@ std::string read_json_body(Request& request, uint64_t max_bytes) {
                            "application/json"))
     throw Problem(415, "unsupported_media_type",
                   "Content-Type is '" + printable(type) + "': expected application/json");
-  const Problem too_large(
-      413, "too_large",
-      "the body is too large: expected at most " + std::to_string(max_bytes) + " bytes");
+  const Problem too_large(413, "too_large",
+                          "the body is too large: expected at most " + exact_size_text(max_bytes));
   if (request.content_length.value_or(0) > max_bytes) throw too_large;
   std::string body;
   const BodyEnd end = request.read_short_body([&](std::string_view piece) {
