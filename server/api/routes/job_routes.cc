@@ -39,9 +39,13 @@ const Parameter kReplayed = {"Idempotent-Replayed", "true if the key was used be
 const Parameter kJobLimit = {"limit", "maximum number of entries", "", IntegerRange{1, 200, 50}};
 const Parameter kJobCursor = {"cursor", "next_cursor of the previous page", "",
                               IntegerRange{1, INT64_MAX, INT64_MAX}};
+// The characters of is_printable() (core/base/text/printable.h), as a regular expression.
+const std::string kPrintable =
+    R"([^\u0000-\u001F\u007F-\u009F\u061C\u200E\u200F\u2028-\u202E\u2066-\u2069])";
 const Parameter kJobWords = {
-    "q", "text in the name, the scenes or the labels, or at the beginning of the id", "^.{0,100}$"};
-const Parameter kJobLabel = {"label", "a label of the jobs", "^.{0,64}$"};
+    "q", "text in the name, the scenes or the labels, or at the beginning of the id",
+    "^" + kPrintable + "{0,100}$"};
+const Parameter kJobLabel = {"label", "a label of the jobs", "^" + kPrintable + "{0,64}$"};
 constexpr size_t kMaxSearchBytes = 400;  // 100 characters
 const Parameter kJobStates = {"state", "comma-separated list of states", [] {
                                 std::string states = kJobStateNames[0];
