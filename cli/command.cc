@@ -4,6 +4,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 #include <optional>
 #include <sstream>
@@ -230,7 +231,12 @@ int CommandLine::run(int argc, char** argv) {
     app_->parse(std::move(words));
   } catch (const CLI::ParseError& error) {
     // CLI11 reports --help and --version as errors with status 0.
-    if (error.get_exit_code() == 0) return app_->exit(error);
+    if (error.get_exit_code() == 0) {
+      std::ostringstream text;
+      const int status = app_->exit(error, text, text);
+      std::fputs(text.str().c_str(), stdout);
+      return status;
+    }
     check_arguments(*app_);
     throw Error(ErrorCode::kInvalidInput, error.what());
   }

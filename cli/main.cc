@@ -1,4 +1,5 @@
 #include <poll.h>
+#include <sys/types.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -39,14 +40,41 @@ bool is_reader_gone() {
   _exit(128 + SIGPIPE);  // the caller of this process has blocked the signal
 }
 
+// The value of errno of the first failed write to standard output; 0 if none failed. The stream
+// does not keep it, so a long output, which takes several writes, would lose the reason.
+int g_output_errno = 0;
+
+// Writes all bytes, because the stream regards a smaller number as an error.
+ssize_t write_output(void*, const char* text, size_t bytes) {
+  size_t done = 0;
+  while (done < bytes) {
+    const ssize_t written = write(STDOUT_FILENO, text + done, bytes - done);
+    if (written >= 0) {
+      done += static_cast<size_t>(written);
+    } else if (errno != EINTR) {
+      if (!g_output_errno) g_output_errno = errno;
+      break;
+    }
+  }
+  return static_cast<ssize_t>(done);
+}
+
+// Replaces `stdout` by a stream that records why a write failed.
+void watch_output() {
+  FILE* const output = fopencookie(nullptr, "w", {nullptr, write_output, nullptr, nullptr});
+  if (!output) return;  // too little memory: the first allocation of the command reports it
+  std::setvbuf(output, nullptr, isatty(STDOUT_FILENO) == 1 ? _IOLBF : _IOFBF, BUFSIZ);
+  stdout = output;
+}
+
 // Flushes standard output. Throws if the buffered text cannot be written, so that the command
 // fails. If its reader has closed the pipe, as `head` does after the first lines, ends the process
 // without a message: the reader has what it needs.
 void check_output() {
-  errno = 0;
-  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;
-  if (errno == EPIPE || is_reader_gone()) end_by_closed_pipe();
-  const int reason = errno ? errno : EIO;
+  const bool is_flushed = std::fflush(stdout) == 0 && !std::ferror(stdout);
+  if (is_flushed && !g_output_errno) return;
+  const int reason = g_output_errno ? g_output_errno : EIO;
+  if (reason == EPIPE || is_reader_gone()) end_by_closed_pipe();
   throw Error(code_of_errno(reason), "write to the standard output: " + errno_text(reason));
 }
 
@@ -102,6 +130,7 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   voxdag::return_freed_memory_to_system();
+  voxdag::cli::watch_output();
   voxdag::cli::catch_signals(voxdag::cli::g_cancel);
   return voxdag::cli::run(argc, argv);
 }
