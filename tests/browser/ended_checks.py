@@ -41,8 +41,8 @@ def check_retry_of_canceled(visitor, server):
     """A page of a canceled job polls at growing intervals until it can draw."""
     page = visitor.page
     page.add_init_script(ASKED)
-    job = Job(server, RESOLUTION, subvolume=SUBVOLUME, threads=1)
-    job.until("the subvolumes are planned", job.subvolumes)
+    job = Job(server, 2 * RESOLUTION, subvolume=SUBVOLUME, threads=1)
+    job.until("its plan can be read", lambda: job.durable()[1] > 0)
     server.send("POST", f"{job.path}/cancel")
     job.until("it is canceled", lambda: job.state() == "canceled")
 
@@ -62,8 +62,8 @@ def check_retry_of_canceled(visitor, server):
     heading(visitor, "This job was canceled.")
     page.get_by_text("The service does not answer. Trying again.").wait_for()
     server.send("POST", f"{job.path}/retry")
-    # The plan of the first attempt is available throughout.
-    job.hold_at_work()
+    job.until("its new plan can be read", lambda: job.durable()[1] > 0)
+    job.signal(signal.SIGSTOP)
     assert job.known("partial/tiles").get("camera"), "a job at work cannot be drawn"
     page.evaluate(f"asked.way = 'answer', {WAKE}")
     visitor.wait_until("Boolean(window.voxdagViewer?.running)")
