@@ -208,6 +208,34 @@ def check_ends(visitor, server):
         assert page.locator(part).is_hidden(), f"{part} is shown next to the message"
 
 
+def check_color_stage(visitor, server):
+    """While colors are computed, the viewer shows the complete DAG, and the job's page how many
+    regions are ready."""
+    job = Job(server, RESOLUTION, threads=1, color=True)
+
+    def is_coloring():
+        progress = json.loads(server.get(job.path)).get("progress") or {}
+        return (
+            progress.get("stage") == "color"
+            and progress.get("total")
+            and job.known("partial/tiles").get("merged")
+        )
+
+    job.until("its colors are computed", is_coloring)
+    job.signal(signal.SIGSTOP)
+    try:
+        visitor.open(job.page)
+        visitor.wait_until("voxdagViewer.running && Boolean(voxdagViewer.renderer.info.root)")
+        assert hits(capture(visitor)) > 0, "the DAG is not shown while colors are computed"
+        visitor.open(f"{server.url}/#/jobs/{job.id}", wait=False)
+        visitor.page.get_by_text("% of the regions are ready").wait_for()
+        visitor.open("about:blank", wait=False)
+        server.send("POST", f"{job.path}/cancel")
+    finally:
+        job.signal(signal.SIGCONT)
+    job.until("it is canceled", lambda: job.state() == "canceled")
+
+
 def check_running_jobs(visitor, server, scene):
     server.send("PUT", f"/api/v1/scenes/{SCENE}", scene.read_bytes())
     # Before the plan, after the end and after a deletion, the service answers requests with 404 or
@@ -215,3 +243,4 @@ def check_running_jobs(visitor, server, scene):
     with visitor.expecting("status of 40[49]"):
         check_ends(visitor, server)
         check_growing(visitor, server)
+        check_color_stage(visitor, server)
