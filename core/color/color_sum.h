@@ -31,6 +31,26 @@ struct ColorSum {
   bool operator==(const ColorSum&) const = default;
 };
 
+// The color of a surface that has the same color at all of its points: linear intensities with 16
+// bits, and alpha with 8 bits.
+struct FlatColor {
+  std::array<uint16_t, 3> rgb{};
+  uint8_t alpha = 255;
+  bool operator==(const FlatColor&) const = default;
+
+  // Adds a surface of this color to `sum`. A call with the sum of several weights has the same
+  // result as a call for each weight, even if the members of `sum` overflow.
+  VOXDAG_HD void add_to(ColorSum& sum, uint64_t weight) const {
+    const uint64_t visible = weight * alpha;
+    for (size_t c = 0; c < 3; ++c) {
+      sum.seen[c] += visible * rgb[c];
+      sum.plain[c] += weight * rgb[c];
+    }
+    sum.seen_weight += visible;
+    sum.weight += weight;
+  }
+};
+
 // A set cell of the color grid, in a region of 64^3 such cells.
 struct ColoredCell {
   uint32_t code = 0;  // Morton code within the region, below 2^18

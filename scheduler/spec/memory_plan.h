@@ -117,7 +117,7 @@ struct ColorMemory {
   // Memory for baking one region of the color grid. kRegionBytes is the minimum; with it, a large
   // region is baked in pieces. kSolidRegionBytes is enough to bake any region in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
-  static constexpr uint64_t kSolidRegionBytes = uint64_t{46} << 20;
+  static constexpr uint64_t kSolidRegionBytes = uint64_t{47} << 20;
   // Memory for the attributes other than color in a region. Includes kValueSumBytes for the sums of
   // their values. Larger sums are charged in addition (CubeBaker).
   static constexpr uint64_t kValueBytes = uint64_t{16} << 20;

@@ -27,6 +27,8 @@ class AttributeEncoder {
   // `values` must have an element for each cell. Otherwise `values` may be empty.
   void add(std::span<const ColoredCell> cells, std::span<const CellValues> values,
            uint32_t first_code);
+  // Returns the encoder of colors, to which cells can be added directly; null for other attributes.
+  RegionEncoder* colors() { return traits_.is_color() ? &colors_ : nullptr; }
   bool empty() const { return traits_.is_color() ? colors_.empty() : values_.empty(); }
   // Returns the encoded region; `morton` is its EncodedRegion::morton. Call it once, after at least
   // one cell was added.

@@ -6,26 +6,45 @@
 
 namespace voxdag {
 
+// Adds the color of `count` cells of the level that is `up` levels above the region's finest level.
+// They have the same parent, and `code` is the code of one of them.
+inline void RegionEncoder::add_colors(uint32_t up, uint32_t code, size_t count, Color color) {
+  constexpr uint32_t kPrefixBits = 3 * kPrefixLevels;
+  uint32_t& added = region_.counts[up];
+  if (up + kPrefixLevels < levels_ &&
+      (added == 0 || code >> kPrefixBits != last_code_ >> kPrefixBits))
+    region_.prefix.push_back(added);
+  last_code_ = code;
+  added += static_cast<uint32_t>(count);
+  for (size_t i = 0; i < count; ++i) colors_.push_back(color);
+}
+
+// Adds the sum of a cell to its parent. The cells of a level come in Morton order.
+inline void RegionEncoder::add_to_parent(uint32_t code, const ColorSum& sum) {
+  if (parents_.empty() || parents_.back().code != code >> 3)
+    parents_.push_back({code >> 3, sum});
+  else
+    parents_.back().sum.add(sum);
+}
+
 // Adds cells of the level that is `up` levels above the region's finest level. The code of a cell
 // is `first_code` + cell.code. Several calls can add the cells of a level, in Morton order.
 template <class ColorOf>
 void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,
                               const ColorOf& color) {
-  constexpr uint32_t kPrefixBits = 3 * kPrefixLevels;
-  const bool has_prefix = up + kPrefixLevels < levels_;
-  uint32_t& count = region_.counts[up];
   for (const ColoredCell& cell : cells) {
     const uint32_t code = first_code + cell.code;
-    if (has_prefix && (count == 0 || code >> kPrefixBits != last_code_ >> kPrefixBits))
-      region_.prefix.push_back(count);
-    last_code_ = code;
-    ++count;
-    colors_.push_back(color(cell, code));
-    if (parents_.empty() || parents_.back().code != code >> 3)
-      parents_.push_back({code >> 3, cell.sum});
-    else
-      parents_.back().sum.add(cell.sum);
+    add_colors(up, code, 1, color(cell, code));
+    add_to_parent(code, cell.sum);
   }
+}
+
+void RegionEncoder::add_siblings(uint32_t code, size_t count, const FlatColor& color,
+                                 uint64_t weight, Color stored) {
+  add_colors(0, code, count, stored);
+  ColorSum sum;
+  color.add_to(sum, weight);
+  add_to_parent(code, sum);
 }
 
 void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells,
@@ -38,13 +57,15 @@ void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells,
   });
 }
 
+void RegionEncoder::reserve(size_t cells) {
+  if (!colors_.empty()) return;
+  // The coarser levels usually have less than half as many cells in total.
+  colors_.reserve(cells + cells / 2);
+  parents_.reserve(std::min(cells, size_t{1} << 3 * levels_ >> 3));
+}
+
 void RegionEncoder::add(std::span<const ColoredCell> cells, uint32_t first_code) {
-  if (colors_.empty()) {
-    // Reserves space for these cells and for the coarser levels, which usually have less than half
-    // as many cells in total.
-    colors_.reserve(cells.size() + cells.size() / 2);
-    parents_.reserve(std::min(cells.size(), size_t{1} << 3 * levels_ >> 3));
-  }
+  reserve(cells.size());
   add_level(0, cells, first_code);
 }
 

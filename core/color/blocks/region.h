@@ -54,11 +54,21 @@ class RegionEncoder {
   // Adds cells of the finest level in increasing order of their codes. The code of a cell in the
   // region is `first_code` + cell.code, which is below 8^levels.
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
+  // Reserves memory for a region of which the first part has `cells` cells of the finest level.
+  void reserve(size_t cells);
+  // Adds `count` cells of the finest level that have the same parent, of which `code` is the first
+  // possible one. All their surfaces have one flat color. `weight` is the sum of the surfaces'
+  // weights, and `stored` is the color_of() each cell. Requires that the constructor got no
+  // CellColor.
+  void add_siblings(uint32_t code, size_t count, const FlatColor& color, uint64_t weight,
+                    Color stored);
   bool empty() const { return colors_.empty(); }
   // Returns the encoded region. Call it once, at the end. Requires at least one cell.
   EncodedRegion finish(uint64_t morton);
 
  private:
+  void add_colors(uint32_t up, uint32_t code, size_t count, Color color);
+  void add_to_parent(uint32_t code, const ColorSum& sum);
   template <class ColorOf>
   void add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,
                  const ColorOf& color);

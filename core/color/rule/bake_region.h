@@ -109,11 +109,18 @@ class RegionBaker {
     }
     return has_all;
   }
+  // The three functions finish() return the result of the preceding calls, each for another use.
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
   // Sets `cells` as bake() does. Sets `values` to an element for each cell if normals or materials
   // are wanted.
   void finish(std::vector<ColoredCell>& cells, std::vector<CellValues>& values) {
     cells_.take(cells, values);
+  }
+  // Adds the colors of the cells to `encoder`, a RegionEncoder. The code of a cell in the encoder's
+  // region is `first_code` plus the cell's code in the region of begin().
+  template <class Encoder>
+  void finish(uint32_t first_code, Encoder& encoder) {
+    cells_.take(first_code, encoder);
   }
 
  private:
@@ -170,17 +177,17 @@ class RegionBaker {
     }
     void flush() {
       if (collected_ == 0) return;
-      if (!look_)
+      if (!look_) {
         look_.emplace(surface_, baker_.materials_[surface_.material], baker_.textures_,
                       triangle_.cell_bits, triangle_.area, baker_.has_mask(surface_.material));
-      for (Cell& added : std::span(batch_).first(collected_)) {
-        const color::ColumnTotals totals = color::totals_of(added.columns);
-        added.weight = covered_.weight(totals);
-        added.spot = look_->spot_at(covered_.mean_point(added.p, added.q, totals));
-        added.cell = baker_.cells_.cover(added.cell);
+        flat_ = look_->flat_color();
+        if (flat_) flat_index_ = baker_.cells_.index_of(*flat_);
       }
-      for (const Cell& added : std::span(batch_).first(collected_))
-        look_->add(added.spot, added.weight, baker_.cells_.sum(added.cell));
+      const auto batch = std::span(batch_).first(collected_);
+      if (flat_)
+        add_flat(batch);
+      else
+        add_spots(batch);
       if (baker_.cells_.attributes().is_needed()) add_attributes();
       collected_ = 0;
     }
@@ -194,6 +201,23 @@ class RegionBaker {
       typename color::SurfaceLook<Textures>::Spot spot;
     };
 
+    void add_flat(std::span<Cell> batch) {
+      for (Cell& added : batch) {
+        added.weight = covered_.weight(color::count_of(added.columns));
+        added.cell = baker_.cells_.cover(added.cell);
+        baker_.cells_.add(added.cell, *flat_, flat_index_, added.weight);
+      }
+    }
+    void add_spots(std::span<Cell> batch) {
+      for (Cell& added : batch) {
+        const color::ColumnTotals totals = color::totals_of(added.columns);
+        added.weight = covered_.weight(static_cast<uint32_t>(totals.count));
+        added.spot = look_->spot_at(covered_.mean_point(added.p, added.q, totals));
+        added.cell = baker_.cells_.cover(added.cell);
+      }
+      for (const Cell& added : batch)
+        look_->add(added.spot, added.weight, baker_.cells_.sum(added.cell));
+    }
     void add_attributes() {
       if (!facing_) facing_.emplace(baker_.facing_of(surface_));
       for (const Cell& added : std::span(batch_).first(collected_))
@@ -206,6 +230,8 @@ class RegionBaker {
     const color::CellTriangle<Int>& triangle_;
     const color::CoveredSurface<Int> covered_;
     std::optional<color::SurfaceLook<Textures>> look_;
+    std::optional<FlatColor> flat_;  // the color, if it is flat, and its index in RegionCells
+    uint32_t flat_index_ = 0;
     std::optional<color::SurfaceFacing> facing_;
     Cell batch_[kBatch];
     size_t collected_ = 0;

@@ -30,8 +30,14 @@ struct ColumnTable {
   }
 };
 
+inline constexpr ColumnTable kColumnTable{};
+
+VOXDAG_HD inline uint32_t count_of(uint32_t columns) {
+  return uint32_t{kColumnTable.count[columns & 255]} + kColumnTable.count[columns >> 8];
+}
+
 VOXDAG_HD inline ColumnTotals totals_of(uint32_t columns) {
-  static constexpr ColumnTable kTable{};
+  constexpr const ColumnTable& kTable = kColumnTable;
   const uint32_t low = columns & 255, high = columns >> 8;
   const int64_t high_count = kTable.count[high];
   return {kTable.count[low] + high_count, int64_t{kTable.sum_i[low]} + kTable.sum_i[high],

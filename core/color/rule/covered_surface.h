@@ -34,9 +34,8 @@ class CoveredSurface {
     column_weight_ = static_cast<uint32_t>(kColumnWeight * t_.area / normal + 0.5);
   }
 
-  VOXDAG_HD uint32_t weight(const ColumnTotals& totals) const {
-    return column_weight_ * static_cast<uint32_t>(totals.count);
-  }
+  // Returns the weight in a cell of which `columns` columns are covered.
+  VOXDAG_HD uint32_t weight(uint32_t columns) const { return column_weight_ * columns; }
 
   // Returns the mean point of the covered columns of a cell. At least one column must be covered.
   VOXDAG_HD SurfacePoint mean_point(int64_t p, int64_t q, const ColumnTotals& totals) const {

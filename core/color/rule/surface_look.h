@@ -172,6 +172,18 @@ class SurfaceLook {
     return spot;
   }
 
+  // Returns the color of all points, if they have the same: the surface has no image, and its
+  // corners have equal colors.
+  VOXDAG_HD std::optional<FlatColor> flat_color() const {
+    if (view_ || !one_tint_) return std::nullopt;
+    const Texel texel = tinted(~Texel{0}, tint_);
+    FlatColor color;
+    for (int c = 0; c < 3; ++c)
+      color.rgb[static_cast<size_t>(c)] = static_cast<uint16_t>(channel(texel, c));
+    color.alpha = static_cast<uint8_t>(alpha_of(channel(texel, 3)));
+    return color;
+  }
+
   // Adds the color at a spot to `sum` with `weight`, which is less than 2^24.
   VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
     Texel texel = ~Texel{0};

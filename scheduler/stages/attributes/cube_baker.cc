@@ -22,8 +22,8 @@ constexpr uint64_t kSurfaceBytes =
 // Bytes of records that are collected for a child cube before they go to the store.
 constexpr size_t kPartBytes = 16 << 10;
 
-// Memory of a baked cell: its sum, a sorted copy of the sum, and its colors.
-constexpr uint64_t kCellBytes = sizeof(ColorSum) + sizeof(ColoredCell) + 8;
+// Memory of a baked cell: its weight, its sum, a sorted copy of the sum, and its colors.
+constexpr uint64_t kCellBytes = sizeof(uint64_t) + sizeof(ColorSum) + sizeof(ColoredCell) + 8;
 // Other memory of a baker: positions of cells, the next coarser level, and two parts of the
 // records.
 constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
@@ -187,8 +187,8 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
   if (most >= kManyRecordBytes) sink.take(sink.records);
 }
 
-// Bakes the cells of a cube. Returns false if the cube has more than `max_cells` cells, or if the
-// sums of its normals and materials do not fit in memory.
+// Bakes the cells of a cube, for collect(). Returns false if the cube has more than `max_cells`
+// cells, or if the sums of its normals and materials do not fit in memory.
 template <class AddSurfaces>
 bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces) {
   bool is_complete = true;
@@ -198,7 +198,7 @@ bool CubeBaker::bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfac
     is_complete =
         is_complete && baker_.add(surfaces, [&](uint64_t bytes) { return charge_sums(bytes); });
   });
-  baker_.finish(cells_, values_);
+  if (!is_complete) baker_.finish(cells_, values_);  // discards the cells
   return is_complete;
 }
 
@@ -214,7 +214,10 @@ bool CubeBaker::charge_sums(uint64_t bytes) {
 
 // Adds the cells of the baked cube to the encoders of its region. `first_code` is the Morton code,
 // within the region, of the cube's first cell.
-void CubeBaker::collect(uint32_t first_code, std::span<AttributeEncoder> encoders) const {
+void CubeBaker::collect(uint32_t first_code, std::span<AttributeEncoder> encoders) {
+  if (encoders.size() == 1 && encoders[0].colors())
+    return baker_.finish(first_code, *encoders[0].colors());
+  baker_.finish(cells_, values_);
   for (AttributeEncoder& encoder : encoders) encoder.add(cells_, values_, first_code);
 }
 

@@ -57,7 +57,7 @@ class CubeBaker {
   template <class AddSurfaces>
   bool bake_cells(const Cube& cube, uint32_t max_cells, const AddSurfaces& add_surfaces);
   bool charge_sums(uint64_t bytes);
-  void collect(uint32_t first_code, std::span<AttributeEncoder> encoders) const;
+  void collect(uint32_t first_code, std::span<AttributeEncoder> encoders);
 
   const ColorGrid grid_;
   const std::span<const StoredAttribute> attributes_;

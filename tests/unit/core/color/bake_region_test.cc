@@ -6,6 +6,7 @@
 #include <map>
 
 #include "core/base/integers.h"
+#include "core/color/blocks/region.h"
 #include "core/color/color_of.h"
 #include "tests/oracle/overlap.h"
 #include "tests/unit/core/color/looks.h"
@@ -145,6 +146,69 @@ TEST(BakeRegion, CellsThatNothingCoversOfManyTriangles) {
   for (uint32_t x = 1; x < 4; ++x) in_others += sums.at({x, 0, 0}).weight;
   EXPECT_GT(in_others, 110000u);
   EXPECT_LT(in_others, 115000u);
+}
+
+// Gives each surface one of `colors` random colors, or no change if `colors` is 0.
+void make_flat(std::vector<FixedSurface>& surfaces, int colors) {
+  oracle::Random random(17);
+  std::vector<std::array<uint16_t, 4>> palette(static_cast<size_t>(colors));
+  for (auto& color : palette)
+    for (uint16_t& c : color) c = static_cast<uint16_t>(random.between(0, 65535));
+  for (FixedSurface& surface : surfaces)
+    if (colors > 0)
+      for (auto& corner : surface.corners)
+        corner.color = palette[static_cast<size_t>(&surface - surfaces.data()) % palette.size()];
+}
+
+// The sums of cells whose surfaces all have one flat color are computed in another way than other
+// sums. A white image does not change a color, but the surface no longer counts as flat.
+TEST(BakeRegion, FlatColorsAddUpLikeImages) {
+  TestLooks flat, white;
+  white.images.add_white();
+  for (Material& material : flat.materials) material.image = Material::kNoImage;
+  for (Material& material : white.materials) material.image = 2;
+  const ColorGrid grid{7, 5};
+  for (const SceneKind kind : oracle::kAllKinds)
+    for (const int colors : {1, 3, 100}) {
+      SCOPED_TRACE(oracle::kind_name(kind) + " " + std::to_string(colors));
+      auto surfaces = scene(flat, kind, 5, grid, 300);
+      make_flat(surfaces, colors);
+      const Sums sums = bake_grid(grid, 0, surfaces, flat);
+      EXPECT_GT(sums.size(), 20u);
+      EXPECT_EQ(sums, bake_grid(grid, 0, surfaces, white));
+    }
+}
+
+// Encoding cells directly gives the same region as encoding their sums, for regions in one piece
+// and in eight.
+TEST(BakeRegion, EncodesWhatItsSumsGive) {
+  TestLooks looks;
+  for (size_t i = 0; i < 6; ++i) looks.materials[i].image = Material::kNoImage;
+  const ColorGrid grid{8, 6};
+  for (const SceneKind kind : oracle::kAllKinds)
+    for (const int colors : {0, 1, 3, 100})
+      for (const uint32_t level : {0u, 1u}) {
+        SCOPED_TRACE(oracle::kind_name(kind) + " " + std::to_string(colors));
+        auto surfaces = scene(looks, kind, 13, grid, 40);
+        make_flat(surfaces, colors);
+        RegionEncoder direct(grid.color_levels), by_sums(grid.color_levels);
+        RegionBaker<const TestImages> baker(grid, looks.materials, looks.images);
+        std::vector<ColoredCell> cells;
+        const uint32_t pieces = 1u << 3 * level, of_piece = (1u << 3 * grid.color_levels) / pieces;
+        for (uint32_t piece = 0; piece < pieces; ++piece) {
+          const Cube cube = level == 0 ? Cube{} : Cube{}.child(static_cast<int>(piece));
+          baker.bake(cube, surfaces, cells);
+          by_sums.add(cells, piece * of_piece);
+          baker.begin(cube);
+          baker.add(surfaces);
+          baker.finish(piece * of_piece, direct);
+        }
+        const EncodedRegion a = direct.finish(0), b = by_sums.finish(0);
+        EXPECT_EQ(a.counts, b.counts);
+        EXPECT_EQ(a.blocks, b.blocks);
+        EXPECT_EQ(a.prefix, b.prefix);
+        EXPECT_EQ(a.total, b.total);
+      }
 }
 
 // Sums from 64-bit and from 128-bit integers are equal. A triangle is baked twice; the second time,

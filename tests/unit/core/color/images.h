@@ -46,6 +46,9 @@ class TestImages {
       pyramids_.back().push_back(halved(pyramids_.back().back()));
   }
 
+  // Adds an opaque white image of one texel.
+  void add_white() { pyramids_.push_back({{1, 1, {{65535, 65535, 65535, 65535}}}}); }
+
   uint32_t levels(uint32_t image) const { return static_cast<uint32_t>(pyramids_[image].size()); }
   uint32_t width(uint32_t image, uint32_t level) const { return pyramids_[image][level].width; }
   uint32_t height(uint32_t image, uint32_t level) const { return pyramids_[image][level].height; }
