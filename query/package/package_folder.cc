@@ -8,7 +8,6 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxIndexBytes = uint64_t{256} << 20;
 constexpr const char* kWorkSuffix = ".work-";
 
 // Returns `path` without slashes at its end. With a slash, the names of temporary files, which are

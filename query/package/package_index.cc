@@ -174,13 +174,17 @@ PackageIndex parse_index(std::string_view text, const std::string& path) {
   return Parser(path).parse(text);
 }
 
+std::string hash_digits(uint64_t hash) {
+  std::array<char, 17> digits;
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(hash));
+  return digits.data();
+}
+
 std::string hashed_name(const std::string& stem, std::string_view contents,
                         const std::string& suffix) {
-  std::array<char, 17> digits;
-  std::snprintf(digits.data(), digits.size(), "%016llx",
-                static_cast<unsigned long long>(
-                    checksum64(std::as_bytes(std::span(contents.data(), contents.size())))));
-  return stem + "-" + digits.data() + suffix;
+  return stem + "-" +
+         hash_digits(checksum64(std::as_bytes(std::span(contents.data(), contents.size())))) +
+         suffix;
 }
 
 }  // namespace voxdag::query

@@ -58,6 +58,10 @@ struct PackageIndex {
 };
 
 inline constexpr const char* kIndexName = "package.json";
+// Maximum size of package.json. It has about 70 bytes for 4096 blocks, and about 70 for each pack.
+// Without this limit, a small hostile package could fill the memory: parsed JSON takes many times
+// its size.
+inline constexpr uint64_t kMaxIndexBytes = uint64_t{8} << 20;
 
 std::string index_text(const PackageIndex& index);
 // Parses the text of package.json, and checks that its numbers are consistent. Throws
@@ -65,6 +69,8 @@ std::string index_text(const PackageIndex& index);
 // Error messages begin with `path`.
 PackageIndex parse_index(std::string_view text, const std::string& path);
 
+// Returns a hash as 16 hex digits.
+std::string hash_digits(uint64_t hash);
 // Returns the file name `stem`-HASH`suffix`. HASH is the XXH64 of `contents`, as 16 hex digits.
 std::string hashed_name(const std::string& stem, std::string_view contents,
                         const std::string& suffix);

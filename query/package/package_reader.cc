@@ -19,10 +19,13 @@
 namespace voxdag::query {
 namespace {
 
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
+constexpr size_t kPartBytes = size_t{1} << 20;      // files are hashed in parts of this size
 constexpr size_t kMaxBlockBytes = size_t{1} << 20;  // size of a decompressed block
 constexpr size_t kDirectoryEntryBytes = 2, kCodeBytes = 8;
-constexpr size_t kHashDigits = 16;
+// Minimum size of a compressed block: header, trailer, and the data of an empty gzip stream.
+constexpr uint64_t kMinBlockBytes = 20;
+// Maximum size of a compressed page of the directory. It is larger than any plain page.
+constexpr uint64_t kMaxPageBytes = 2 * (kDirectoryEntryBytes + kCodeBytes) * kPageBlocks;
 
 [[noreturn]] void corrupt(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::kCorrupt, path + ": " + what);
@@ -40,7 +43,7 @@ T number_at(std::string_view bytes, size_t at) {
 PackageReader::PackageReader(FileSystem& files, const std::string& folder)
     : files_(files), folder_(folder) {
   const std::string path = path_of(kIndexName);
-  index_ = parse_index(read_small_file(files_, path, kMaxFileBytes), path);
+  index_ = parse_index(read_small_file(files_, path, kMaxIndexBytes), path);
   const auto manifest = nlohmann::json::parse(index_.manifest);
   const auto levels = manifest.value("levels", nlohmann::json());
   if (!levels.is_number_unsigned() || levels.get<uint64_t>() < kBrickLevels ||
@@ -57,16 +60,36 @@ PackageReader::PackageReader(FileSystem& files, const std::string& folder)
       corrupt(path, "'bands' has the level " + std::to_string(band.level) +
                         ": expected a level of the grid of " + std::to_string(grid_levels_) +
                         " levels");
-  read_directory();
+  for (const PackageFile& pack : index_.packs) pack_ends_.push_back(blocks_ += pack.blocks);
+  uint64_t at = 0;
+  for (const DirectoryPage& page : index_.pages) {
+    page_begins_.push_back(at);
+    at += page.bytes;
+  }
+  check_directory();
 }
 
-void PackageReader::read_directory() {
+// Reads all pages of the directory, one after the other. Checks that each begins at the block after
+// the previous page, as its entry in the index says.
+void PackageReader::check_directory() {
   const std::string path = path_of(index_.directory.name);
-  const std::string bytes = read_small_file(files_, path, kMaxFileBytes);
-  if (bytes.size() != index_.directory.bytes)
-    corrupt(path, "it has " + std::to_string(bytes.size()) + " bytes: expected " +
+  const uint64_t bytes = files_.open_read(path)->size();
+  if (bytes != index_.directory.bytes)
+    corrupt(path, "it has " + std::to_string(bytes) + " bytes: expected " +
                       std::to_string(index_.directory.bytes));
-  naming_file(path, [&] { place_blocks(bytes); });
+  Place last;
+  for (uint64_t page = 0; page < index_.pages.size(); ++page) {
+    const std::vector<Place> places = read_page(page);
+    const Place& begin = places.front();
+    const bool is_same_pack = page > 0 && begin.pack == last.pack;
+    const DirectoryPage& entry = index_.pages[page];
+    if (begin.offset != (is_same_pack ? last.offset + last.bytes : 0) || begin.pack != entry.pack ||
+        begin.code != entry.code)
+      corrupt(path, "page " + std::to_string(page) +
+                        " begins at another block than its entry in the index says, expected the "
+                        "same block");
+    last = places.back();
+  }
 }
 
 uint64_t PackageReader::count_color_blocks(uint64_t first, uint64_t count) const {
@@ -80,55 +103,72 @@ uint64_t PackageReader::count_color_blocks(uint64_t first, uint64_t count) const
   return colored;
 }
 
-void PackageReader::place_blocks(const std::string& directory) {
-  uint64_t blocks = 0, at = 0;
-  for (const PackageBand& band : index_.bands) blocks += band.blocks;
-  uint64_t pack = 0, offset = 0, in_pack = 0;
+std::vector<PackageReader::Place> PackageReader::read_page(uint64_t page) const {
+  const std::string path = path_of(index_.directory.name);
+  const DirectoryPage& entry = index_.pages[page];
+  if (entry.bytes > kMaxPageBytes)
+    corrupt(path, "page " + std::to_string(page) + " has " + std::to_string(entry.bytes) +
+                      " bytes, expected at most " + std::to_string(kMaxPageBytes));
+  std::string bytes(entry.bytes, '\0');
+  files_.open_read(path)->read_at(page_begins_[page], std::as_writable_bytes(std::span(bytes)));
+  return naming_file(path, [&] { return decode_page(page, bytes); });
+}
+
+std::vector<PackageReader::Place> PackageReader::decode_page(uint64_t page,
+                                                             const std::string& compressed) const {
+  const uint64_t first = page * kPageBlocks, count = std::min(kPageBlocks, blocks_ - first),
+                 colored = count_color_blocks(first, count);
+  const uint64_t expected = kDirectoryEntryBytes * count + kCodeBytes * colored;
+  const std::string plain = gunzip_block(compressed, kMaxPageBytes);
+  if (plain.size() != expected)
+    throw Error(ErrorCode::kCorrupt,
+                "page " + std::to_string(page) + " has " + std::to_string(plain.size()) +
+                    " bytes after decompression, expected " + std::to_string(expected) +
+                    ", the bytes of " + std::to_string(count) + " entries");
+  size_t low = kDirectoryEntryBytes * count, high = low + 4 * colored;
+  auto pack =
+      static_cast<uint64_t>(std::ranges::upper_bound(pack_ends_, first) - pack_ends_.begin());
+  uint64_t offset = index_.pages[page].offset;
   size_t band = 0;
-  uint64_t in_band = 0;
-  for (const DirectoryPage& page : index_.pages) {
-    const uint64_t first = places_.size(), count = std::min(kPageBlocks, blocks - first),
-                   colored = count_color_blocks(first, count);
-    const std::string plain =
-        gunzip_block(std::string_view(directory).substr(at, page.bytes), kMaxBlockBytes);
-    at += page.bytes;
-    const uint64_t expected = kDirectoryEntryBytes * count + kCodeBytes * colored;
-    if (plain.size() != expected)
-      throw Error(ErrorCode::kCorrupt, "page " + std::to_string(first / kPageBlocks) + " has " +
-                                           std::to_string(plain.size()) +
-                                           " bytes after decompression, expected " +
-                                           std::to_string(expected) + ", the bytes of " +
-                                           std::to_string(count) + " entries");
-    size_t low = kDirectoryEntryBytes * count, high = low + 4 * colored;
-    for (uint64_t i = 0; i < count; ++i, ++in_pack) {
-      if (in_pack == index_.packs[pack].blocks) {
-        ++pack;
-        offset = in_pack = 0;
-      }
-      for (; in_band == index_.bands[band].blocks; in_band = 0) ++band;
-      ++in_band;
-      Place place{pack, offset, number_at<uint16_t>(plain, kDirectoryEntryBytes * i), 0};
-      if (index_.bands[band].is_color) {
-        place.code = number_at<uint32_t>(plain, low) | uint64_t{number_at<uint32_t>(plain, high)}
-                                                           << 32;
-        low += 4;
-        high += 4;
-      }
-      offset += place.bytes;
-      if (offset > index_.packs[pack].bytes)
-        throw Error(ErrorCode::kCorrupt, "block " + std::to_string(places_.size()) +
-                                             " ends after its pack, expected an end "
-                                             "within the " +
-                                             std::to_string(index_.packs[pack].bytes) +
-                                             " bytes of the pack");
-      places_.push_back(place);
+  uint64_t band_end = index_.bands[0].blocks;
+  std::vector<Place> places;
+  places.reserve(count);
+  for (uint64_t i = 0; i < count; ++i) {
+    const uint64_t block = first + i;
+    if (block == pack_ends_[pack]) {
+      ++pack;
+      offset = 0;
     }
-    const Place& begin = places_[first];
-    if (begin.pack != page.pack || begin.offset != page.offset || begin.code != page.code)
-      throw Error(ErrorCode::kCorrupt, "page " + std::to_string(first / kPageBlocks) +
-                                           " begins at another block than its entry in the "
-                                           "index says, expected the same block");
+    while (block == band_end) band_end += index_.bands[++band].blocks;
+    Place place{pack, offset, number_at<uint16_t>(plain, kDirectoryEntryBytes * i), 0};
+    if (index_.bands[band].is_color) {
+      place.code = number_at<uint32_t>(plain, low) | uint64_t{number_at<uint32_t>(plain, high)}
+                                                         << 32;
+      low += 4;
+      high += 4;
+    }
+    if (place.bytes < kMinBlockBytes)
+      throw Error(ErrorCode::kCorrupt, "block " + std::to_string(block) + " has " +
+                                           std::to_string(place.bytes) + " bytes, expected " +
+                                           std::to_string(kMinBlockBytes) + " or more");
+    offset += place.bytes;
+    if (offset > index_.packs[pack].bytes)
+      throw Error(ErrorCode::kCorrupt, "block " + std::to_string(block) +
+                                           " ends after its pack, expected an end within the " +
+                                           std::to_string(index_.packs[pack].bytes) +
+                                           " bytes of the pack");
+    places.push_back(place);
   }
+  return places;
+}
+
+const PackageReader::Place& PackageReader::place_of(uint64_t block) const {
+  const uint64_t page = block / kPageBlocks;
+  if (page != cached_page_) {
+    cached_places_ = read_page(page);
+    cached_page_ = page;
+  }
+  return cached_places_[block % kPageBlocks];
 }
 
 PackageReader::PlacedBand PackageReader::find_band(bool is_color, uint32_t level) const {
@@ -144,11 +184,11 @@ PackageReader::PlacedBand PackageReader::find_band(bool is_color, uint32_t level
 }
 
 std::string PackageReader::name_of(uint64_t block) const {
-  return path_of(index_.packs[places_[block].pack].name) + ": block " + std::to_string(block);
+  return path_of(index_.packs[place_of(block).pack].name) + ": block " + std::to_string(block);
 }
 
 std::string PackageReader::block(uint64_t block) const {
-  const Place& place = places_[block];
+  const Place& place = place_of(block);
   const auto file = files_.open_read(path_of(index_.packs[place.pack].name));
   std::string bytes(place.bytes, '\0');
   file->read_at(place.offset, std::as_writable_bytes(std::span(bytes.data(), bytes.size())));
@@ -178,25 +218,37 @@ std::vector<uint32_t> PackageReader::color_page(uint32_t level,
   const uint64_t code =
       morton_encode(static_cast<uint32_t>(position[0]), static_cast<uint32_t>(position[1]),
                     static_cast<uint32_t>(position[2]));
-  uint64_t at = band.first;
-  while (at + 1 < band.first + band.band.blocks && places_[at + 1].code <= code) ++at;
   if (band.band.blocks == 0) return {0};
+  const uint64_t end = band.first + band.band.blocks;
+  uint64_t at = band.first;
+  // First skips complete pages of the directory.
+  for (uint64_t page = at / kPageBlocks + 1;
+       page * kPageBlocks < end && index_.pages[page].code <= code; ++page)
+    at = page * kPageBlocks;
+  while (at + 1 < end && place_of(at + 1).code <= code) ++at;
   const std::string bytes = block(at);
   for (CodedPage& page : naming_file(name_of(at), [&] { return decode_color_block(bytes); }))
     if (page.code == code) return std::move(page.words);
   return {0};
 }
 
-void PackageReader::check_file(const PackageFile& file) const {
+void PackageReader::check_file(const PackageFile& file, const CancelToken& cancel) const {
   const std::string path = path_of(file.name);
-  const std::string contents = read_small_file(files_, path, kMaxFileBytes);
-  if (contents.size() != file.bytes)
-    corrupt(path, "it has " + std::to_string(contents.size()) + " bytes: expected " +
+  const auto opened = files_.open_read(path);
+  if (opened->size() != file.bytes)
+    corrupt(path, "it has " + std::to_string(opened->size()) + " bytes: expected " +
                       std::to_string(file.bytes));
-  const std::string hash = hashed_name("", contents, ".").substr(0, kHashDigits + 2);
-  if (file.name.find(hash) == std::string::npos)
-    corrupt(path, "its contents have the hash " + hash.substr(1, kHashDigits) +
-                      ": expected the hash in its name");
+  Checksum64 checksum;
+  std::vector<std::byte> part(std::min<uint64_t>(kPartBytes, file.bytes));
+  for (uint64_t at = 0; at < file.bytes; at += part.size()) {
+    cancel.check();
+    part.resize(std::min<uint64_t>(kPartBytes, file.bytes - at));
+    opened->read_at(at, part);
+    checksum.add(part);
+  }
+  const std::string hash = hash_digits(checksum.value());
+  if (file.name.find("-" + hash + ".") == std::string::npos)
+    corrupt(path, "its contents have the hash " + hash + ": expected the hash in its name");
 }
 
 uint64_t PackageReader::check_tiles(const PlacedBand& band, Progress& progress,
@@ -230,10 +282,10 @@ void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
     naming_file(name_of(at), [&] {
       const std::vector<CodedPage> pages = decode_color_block(bytes);
       const uint64_t code = pages[0].code;
-      if (code != places_[at].code)
+      if (code != place_of(at).code)
         throw Error(ErrorCode::kCorrupt,
                     "its first color page has the Morton code " + std::to_string(code) +
-                        ", expected " + std::to_string(places_[at].code) + " as in the directory");
+                        ", expected " + std::to_string(place_of(at).code) + " as in the directory");
       if (count > 0 && code <= last)
         throw Error(ErrorCode::kCorrupt, "its first color page has the Morton code " +
                                              std::to_string(code) + ", expected more than " +
@@ -251,13 +303,10 @@ void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
 }
 
 void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
-  progress.begin_stage("check", places_.size(), "blocks");
-  check_file(index_.directory);
-  for (const PackageFile& file : index_.viewer) check_file(file);
-  for (const PackageFile& pack : index_.packs) {
-    cancel.check();
-    check_file(pack);
-  }
+  progress.begin_stage("check", blocks_, "blocks");
+  check_file(index_.directory, cancel);
+  for (const PackageFile& file : index_.viewer) check_file(file, cancel);
+  for (const PackageFile& pack : index_.packs) check_file(pack, cancel);
   uint64_t first = 0, expected = 1;
   for (const PackageBand& band : index_.bands) {
     if (band.is_color) {

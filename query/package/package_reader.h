@@ -1,5 +1,7 @@
 // Reads and checks a package (package_index.h). The files can be damaged or malicious, so all sizes
-// in them are checked. Not thread-safe.
+// in them are checked. The memory is about as large as package.json, which is limited to
+// kMaxIndexBytes, plus one page of the directory and one block. It does not depend on the sizes of
+// the other files. Not thread-safe.
 #pragma once
 
 #include <array>
@@ -16,8 +18,8 @@ namespace voxdag::query {
 
 class PackageReader {
  public:
-  // Reads the index and the directory of the package in `folder`. Throws Error: kNotFound if the
-  // folder has no index; kCorrupt; kUnsupportedVersion.
+  // Reads the index of the package in `folder`, and checks its directory. Throws Error: kNotFound
+  // if the folder has no index; kLimit if the index is too large; kCorrupt; kUnsupportedVersion.
   PackageReader(FileSystem& files, const std::string& folder);
 
   const PackageIndex& index() const { return index_; }
@@ -52,14 +54,17 @@ class PackageReader {
     uint64_t first = 0;
   };
 
-  void read_directory();
-  void place_blocks(const std::string& directory);
+  void check_directory();
+  // Reads a page of the directory. Returns the places of its blocks.
+  std::vector<Place> read_page(uint64_t page) const;
+  std::vector<Place> decode_page(uint64_t page, const std::string& compressed) const;
+  const Place& place_of(uint64_t block) const;
   uint64_t count_color_blocks(uint64_t first, uint64_t count) const;
   PlacedBand find_band(bool is_color, uint32_t level) const;
   std::string block(uint64_t block) const;
   std::string path_of(const std::string& name) const { return folder_ + "/" + name; }
   std::string name_of(uint64_t block) const;
-  void check_file(const PackageFile& file) const;
+  void check_file(const PackageFile& file, const CancelToken& cancel) const;
   uint64_t check_tiles(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;
   void check_colors(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;
 
@@ -67,7 +72,12 @@ class PackageReader {
   const std::string folder_;
   PackageIndex index_;
   uint32_t grid_levels_ = 0;
-  std::vector<Place> places_;  // by the number of the block
+  uint64_t blocks_ = 0;
+  std::vector<uint64_t> page_begins_;  // offset of each page in the directory
+  std::vector<uint64_t> pack_ends_;    // number of the block after the last block of each pack
+  // The page of the directory that was read last.
+  mutable uint64_t cached_page_ = ~uint64_t{0};
+  mutable std::vector<Place> cached_places_;
 };
 
 }  // namespace voxdag::query

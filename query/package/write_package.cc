@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
 #include "core/format/checksum.h"
@@ -212,6 +213,10 @@ PackageReport write_package(const voxdag_reader::File& file, const PackageSpec& 
       bytes += page.contents.size();
     }
     const std::string text = index_text(index);
+    if (text.size() > kMaxIndexBytes)
+      throw Error(ErrorCode::kLimit, spec.output + ": its index would have " +
+                                         std::to_string(text.size()) + " bytes, expected at most " +
+                                         std::to_string(kMaxIndexBytes) + ": use larger packs");
     write_file(files, folder.new_files() + "/" + kIndexName, text);
     watched.check_readable();
     folder.publish(index);

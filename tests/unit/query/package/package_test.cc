@@ -7,8 +7,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
+#include "query/package/gzip_block.h"
 #include "query/package/package_reader.h"
 #include "query/package/tile_block.h"
 #include "query/package/write_package.h"
@@ -273,6 +275,54 @@ TEST_F(Package, RefusesChangedIndexes) {
     EXPECT_THAT(
         replaced("\"packs\":[{\"name\":\"", "\"packs\":[{\"name\":\"" + name + "\",\"a\":\""),
         testing::HasSubstr("'name': expected the name of a file in the package"));
+}
+
+// A package of few bytes whose directory has many blocks of 20 bytes.
+struct HostilePackage {
+  uint64_t pages = 0;
+  uint16_t block_bytes = 20;
+  void write(const std::string& folder) const {
+    std::string plain;
+    for (uint64_t i = 0; i < kPageBlocks; ++i)
+      plain += {static_cast<char>(block_bytes & 255), static_cast<char>(block_bytes >> 8)};
+    const std::string page = gzip_block(plain);
+    const uint64_t blocks = pages * kPageBlocks;
+    std::string directory;
+    PackageIndex index;
+    index.manifest = R"({"levels":20,"tile_levels":2})";
+    index.bands = {{.level = 0, .items = blocks * kBlockTiles, .blocks = blocks}};
+    index.packs = {{"packs/0-a.bin", 30 * blocks, blocks}};
+    for (uint64_t i = 0; i < pages; ++i) {
+      index.pages.push_back({.bytes = page.size(), .offset = i * kPageBlocks * 20});
+      directory += page;
+    }
+    index.directory = {hashed_name("directory", directory, ".bin"), directory.size()};
+    fs::create_directories(folder);
+    write_bytes(folder + "/package.json", index_text(index));
+    write_bytes(folder + "/" + index.directory.name, directory);
+  }
+};
+
+// The reader's memory does not depend on the number of blocks.
+TEST_F(Package, ReadsManyPagesInLittleMemory) {
+  constexpr uint64_t kPages = 2000;  // 8 M blocks, whose places would take 250 MiB
+  HostilePackage{.pages = kPages}.write(path("p"));
+  const uint64_t before = resident_bytes();
+  const PackageReader package(system_files(), path("p"));
+  EXPECT_LT(resident_bytes(), before + (uint64_t{32} << 20));
+  EXPECT_EQ(error_of([&] { package.tile(0, kPages * kPageBlocks * kBlockTiles - 1); }).code(),
+            ErrorCode::kNotFound);  // the pack
+}
+
+TEST_F(Package, RefusesWrongDirectories) {
+  HostilePackage{.pages = 2, .block_bytes = 19}.write(path("p"));
+  EXPECT_THAT(check_error("p"), testing::HasSubstr("block 0 has 19 bytes, expected 20 or more"));
+  HostilePackage{.pages = 2, .block_bytes = 21}.write(path("p"));
+  EXPECT_THAT(check_error("p"), testing::HasSubstr("page 1 begins at another block"));
+  const std::string index = path("p/package.json");
+  write_bytes(index, std::string(kMaxIndexBytes, ' ') + read_bytes(index));
+  EXPECT_THAT(check_error("p"), testing::HasSubstr("package.json has"));
+  EXPECT_THAT(check_error("p"), testing::HasSubstr("expected at most 8388608"));
 }
 
 // Decoding a damaged block throws Error{kCorrupt} or returns the right number of tiles.
