@@ -14,6 +14,7 @@
 #include "core/base/text/printable.h"
 #include "core/dag/space/cube_walk.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/watched_file.h"
 #include "query/verify/color_sample.h"
 #include "query/verify/interior_sample.h"
 #include "query/verify/surface_sample.h"
@@ -151,13 +152,17 @@ void check_radius(const VerifyCommand& command) {
 void run(const VerifyCommand& command, CommandContext& context) {
   check_radius(command);
   const auto file = open_global_file(command.path);
+  const WatchedFile watched(*file);
   const auto progress = make_progress_bar(command.quiet);
   MemoryBudget budget(~uint64_t{0});
   PageLimit pages(*file, memory_limit(command.memory));
-  verify_global_file(*file, command.threads, budget, *progress, context.cancel,
-                     global_layout::kNarrowLevelWords, command.quick, &pages);
   std::optional<Sample> sample;
-  if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
+  watched.run([&] {
+    verify_global_file(*file, command.threads, budget, *progress, context.cancel,
+                       global_layout::kNarrowLevelWords, command.quick, &pages);
+    if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
+    watched.check_readable();
+  });
   if (command.json)
     print_json(verify_json(command, *file, sample));
   else

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/color/blocks/value_region.h"
+#include "core/format/color/color_layout.h"
 #include "core/format/global/open_global.h"
 
 namespace voxdag {
@@ -18,10 +19,10 @@ using voxdag_reader::ColorRegion;
 using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
 
-// Walks the set cells of the DAG below a cube, in Morton order.
+// Walks the set cells of the DAG below a cube, in Morton order. Thread-safe.
 class CellWalk {
  public:
-  explicit CellWalk(const voxdag_reader::File& file) : file_(file) {}
+  CellWalk(const voxdag_reader::File& file, PageLimit& pages) : file_(file), pages_(pages) {}
 
   // Calls visit(level, code) for the cells of all levels from `level` to `finest`, each parent
   // before its children. `code` is the cell's Morton code within the cube.
@@ -29,7 +30,7 @@ class CellWalk {
   void walk(uint32_t level, uint64_t place, uint64_t code, uint32_t finest, Visit& visit) const {
     visit(level, code);
     if (level == finest) return;
-    const uint32_t mask = child_mask_at(file_, level, place);
+    const uint32_t mask = mask_at(level, place);
     for (int i = 0; i < 8; ++i)
       if (mask >> i & 1)
         walk(level + 1, child_place_at(file_, level, place, i), 8 * code + static_cast<uint64_t>(i),
@@ -41,7 +42,7 @@ class CellWalk {
   uint64_t count(uint32_t level, uint64_t place, uint32_t target, uint64_t limit) const {
     if (level == target) return 1;
     uint64_t cells = 0;
-    const uint32_t mask = child_mask_at(file_, level, place);
+    const uint32_t mask = mask_at(level, place);
     for (int i = 0; i < 8 && cells <= limit; ++i)
       if (mask >> i & 1)
         cells += count(level + 1, child_place_at(file_, level, place, i), target, limit - cells);
@@ -53,14 +54,26 @@ class CellWalk {
     place = 0;
     for (uint32_t l = 0; l < level; ++l) {
       const auto index = static_cast<int>(code >> 3 * (level - l - 1) & 7);
-      if (!(child_mask_at(file_, l, place) >> index & 1)) return false;
+      if (!(mask_at(l, place) >> index & 1)) return false;
       place = child_place_at(file_, l, place, index);
     }
     return true;
   }
 
  private:
+  // The nodes are at random places, and the system loads up to 64 KiB at each of them.
+  static constexpr uint64_t kNodeReadBytes = uint64_t{64} << 10;
+  static constexpr uint32_t kNodesPerReport = 128;
+
+  uint32_t mask_at(uint32_t level, uint64_t place) const {
+    thread_local uint32_t nodes = 0;
+    if (level <= file_.brick_level() && ++nodes % kNodesPerReport == 0)
+      pages_.touch(kNodesPerReport * kNodeReadBytes);
+    return child_mask_at(file_, level, place);
+  }
+
   const voxdag_reader::File& file_;
+  PageLimit& pages_;
 };
 
 // Message about a region's directory entry that ColorSection::region() refuses.
@@ -68,17 +81,13 @@ constexpr const char* kBrokenEntry =
     "a count of cells or the offset of its data is out of range: expected at most the cells of the "
     "region's cube, and data within the section";
 
-// Estimate of the bytes that are read to check a region. The nodes of its cells are at random
-// places, and the system loads up to 64 KiB at each of them.
-constexpr uint64_t kReadBytesPerRegion = uint64_t{1} << 20;
-
 class ColorVerifier {
  public:
-  ColorVerifier(const voxdag_reader::File& file, Attribute attribute)
+  ColorVerifier(const voxdag_reader::File& file, Attribute attribute, PageLimit& pages)
       : file_(file),
         traits_(traits_of(attribute)),
         section_(section_of(file, attribute)),
-        cells_(file) {}
+        cells_(file, pages) {}
 
   bool is_number_of_regions(const ColorTier& tier) const {
     return cells_.count(0, 0, tier.region_level, tier.region_count) == tier.region_count;
@@ -233,7 +242,7 @@ class ColorVerifier {
 
 void verify_section(const voxdag_reader::File& file, Attribute attribute, unsigned threads,
                     Progress& progress, const CancelToken& cancel, PageLimit& pages) {
-  const ColorVerifier verifier(file, attribute);
+  const ColorVerifier verifier(file, attribute, pages);
   const ColorSection& section = section_of(file, attribute);
   for (uint32_t t = 0; t < section.tier_count(); ++t) {
     const ColorTier& tier = section.tier(t);
@@ -268,7 +277,7 @@ void verify_section(const voxdag_reader::File& file, Attribute attribute, unsign
                           " of 16 bytes: expected " + std::to_string(tier.units) +
                           ", the end of the tier, because it is the last region");
       cells += region.cells;
-      pages.touch(kReadBytesPerRegion);
+      pages.touch(color_layout::kUnitBytes * region.units());
       progress.advance(1);
     });
     if (cells != tier.cell_count)
