@@ -1,4 +1,5 @@
-// The options --fill-color and --no-attributes of the commands that combine files.
+// The options --fill-color, --color-resolution and --no-attributes of the commands that combine
+// files.
 #pragma once
 
 #include <optional>
@@ -11,11 +12,13 @@ namespace voxdag::cli {
 
 struct AttributeOptions {
   std::optional<voxdag_reader::Rgb> fill_color;
+  uint64_t color_resolution = 0;
   bool no_attributes = false;
 
   void declare(Command& command);
   void apply(query::CombineSpec& spec) const {
     spec.fill_color = fill_color;
+    spec.color_resolution = color_resolution;
     spec.attributes = !no_attributes;
   }
 };

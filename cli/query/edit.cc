@@ -13,6 +13,7 @@
 #include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/watched_file.h"
 #include "query/combine/combine.h"
 #include "query/dag/locked_outputs.h"
 #include "query/dag/temporary_work.h"
@@ -52,7 +53,10 @@ class Edit {
         files_(files),
         progress_(make_progress_bar(command.quiet)),
         folder_(files, command.output + ".work-"),
+        shapes_(command.cuts.begin(), command.cuts.end()),
+        parts_(command.parts.begin(), command.parts.end()),
         current_(command.input) {
+    spec_.first_name = command.input;
     spec_.replace = true;
     spec_.clip = command.clip;
     command.attributes.apply(spec_);
@@ -61,17 +65,16 @@ class Edit {
   }
 
   query::CombineReport run() {
-    std::vector<query::Shape> shapes(command_.cuts.begin(), command_.cuts.end());
-    std::vector<Part> parts(command_.parts.begin(), command_.parts.end());
-    for (const query::Shape& shape : shapes)
+    check_parts();
+    const bool has_scenes = !command_.scenes.empty();
+    if (has_scenes) build_scenes();
+    steps_left_ = shapes_.size() + (has_scenes ? 1 : 0) + parts_.size();
+    for (const query::Shape& shape : shapes_)
       apply([&](const voxdag_reader::File& file) {
         return query::cut(file, shape, spec_, files_, *progress_, context_.cancel);
       });
-    if (!command_.scenes.empty()) {
-      build_scenes();
-      unite(scenes_path(), std::nullopt);
-    }
-    for (const Part& part : parts) unite(part.path, part.offset);
+    if (has_scenes) unite(scenes_path(), std::nullopt);
+    for (const Part& part : parts_) unite(part.path, part.offset);
     files_.rename(current_, command_.output);
     files_.sync_directory(parent_directory(command_.output));
     return total_;
@@ -79,9 +82,35 @@ class Edit {
 
  private:
   std::string scenes_path() const { return folder_.path() + "/scenes.vdag"; }
+  // Checks before the first edit that all files can be pasted. The scenes of --add do not change
+  // the attributes, because they are built with the attributes of the input.
+  void check_parts() {
+    const auto input = open_global_file(command_.input);
+    const WatchedFile watched_input(*input);
+    query::FirstFile first{*input, command_.input, attributes_of(*input), input->empty()};
+    query::CombineSpec spec = spec_;
+    bool needs_fill_color = false;
+    for (const Part& part : parts_) {
+      spec.offset = part.offset;
+      const auto file = open_global_file(part.path);
+      const WatchedFile watched(*file);
+      watched.run([&] {
+        needs_fill_color |= query::needs_fill_color(first, *file, spec);
+        first.attributes =
+            with_reader_errors([&] { return query::check_combinable(first, *file, spec); });
+      });
+      first.is_empty &= file->empty();
+    }
+    if (spec.fill_color && !needs_fill_color)
+      progress_->warn(
+          "--fill-color has no effect: it is used if a file without colors is pasted to a file "
+          "with "
+          "colors, or a file with colors to a file without");
+  }
   template <class Step>
   void apply(const Step& step) {
-    spec_.output = folder_.path() + "/" + std::to_string(steps_++) + ".vdag";
+    spec_.output = folder_.path() + "/" + std::to_string(steps_left_--) + ".vdag";
+    spec_.temporary = steps_left_ > 0;
     const auto file = open_global_file(current_);
     query::CombineReport report = step(*file);
     report.pairs += total_.pairs;
@@ -96,12 +125,15 @@ class Edit {
     spec_.offset = offset;
     const auto other = open_global_file(path);
     apply([&](const voxdag_reader::File& file) {
-      return query::combine(file, *other, spec_, files_, *progress_, context_.cancel);
+      query::CombineSpec spec = spec_;
+      if (!query::needs_fill_color({file, spec.first_name, attributes_of(file), file.empty()},
+                                   *other, spec))
+        spec.fill_color.reset();
+      return query::combine(file, *other, spec, files_, *progress_, context_.cancel);
     });
   }
   // Builds the scenes of --add as one DAG, with the grid and the attributes of the input, and
-  // writes it to scenes_path(). Cuts do not change the grid, but a file from which all voxels are
-  // cut has no attributes.
+  // writes it to scenes_path().
   void build_scenes() {
     const auto file = open_global_file(command_.input);
     BuildSpec build;
@@ -110,10 +142,11 @@ class Edit {
     build.geometry.bounds = {file->origin()[0], file->origin()[1], file->origin()[2], file->edge()};
     build.geometry.hash_bits = file->hash_bits();
     if (spec_.attributes) build.geometry.attributes = attributes_of(*file);
+    uint64_t cells = 0;
     for (const Attribute attribute : build.geometry.attributes.list())
-      build.geometry.color_resolution =
-          std::max(build.geometry.color_resolution,
-                   uint64_t{1} << section_of(*file, attribute).color_levels());
+      cells = std::max(cells, uint64_t{1} << section_of(*file, attribute).color_levels());
+    if (spec_.color_resolution > 0) cells = std::min(cells, spec_.color_resolution);
+    build.geometry.color_resolution = cells;
     build.run.output = scenes_path();
     build.run.report = "none";
     build.run.memory_bytes = spec_.memory_bytes;
@@ -126,9 +159,11 @@ class Edit {
   FileSystem& files_;
   const std::unique_ptr<Progress> progress_;
   const query::TemporaryWork folder_;
+  const std::vector<query::Shape> shapes_;
+  const std::vector<Part> parts_;
   query::CombineSpec spec_;
   std::string current_;  // the file that the next edit reads
-  int steps_ = 0;
+  size_t steps_left_ = 0;
   query::CombineReport total_;
 };
 

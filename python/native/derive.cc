@@ -112,8 +112,9 @@ query::Operation operation_named(const std::string& name) {
 
 void combine(const PathText& a, const PathText& b, const std::string& operation,
              const PathText& output, const std::optional<Corner>& offset, bool clip,
-             const std::optional<std::array<uint8_t, 3>>& fill_color, bool no_attributes,
-             const std::string& memory, unsigned threads, bool replace, nb::object progress) {
+             const std::optional<std::array<uint8_t, 3>>& fill_color, uint64_t color_resolution,
+             bool no_attributes, const std::string& memory, unsigned threads, bool replace,
+             nb::object progress) {
   query::CombineSpec spec;
   spec.operation = operation_named(operation);
   spec.output = output.bytes;
@@ -121,6 +122,7 @@ void combine(const PathText& a, const PathText& b, const std::string& operation,
   spec.clip = clip;
   if (fill_color)
     spec.fill_color = voxdag_reader::Rgb{fill_color->at(0), fill_color->at(1), fill_color->at(2)};
+  spec.color_resolution = color_resolution;
   spec.attributes = !no_attributes;
   spec.replace = replace;
   spec.memory_bytes = memory_of(memory);
@@ -185,8 +187,8 @@ void bind_derive(nb::module_& module) {
              nb::arg("gray"), nb::arg("replace"), nb::arg("options"), nb::arg("progress").none());
   module.def("combine", &combine, nb::arg("a"), nb::arg("b"), nb::arg("operation"),
              nb::arg("output"), nb::arg("offset").none(), nb::arg("clip"),
-             nb::arg("fill_color").none(), nb::arg("no_attributes"), nb::arg("memory"),
-             nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
+             nb::arg("fill_color").none(), nb::arg("color_resolution"), nb::arg("no_attributes"),
+             nb::arg("memory"), nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("reorder", &reorder, nb::arg("path"), nb::arg("output"), nb::arg("order"),
              nb::arg("memory"), nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
   module.def("export_paths", &export_paths, nb::arg("format"), nb::arg("output"));

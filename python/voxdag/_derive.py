@@ -2,6 +2,7 @@
 order, and exports to the formats of other programs."""
 
 import json
+import operator
 import os
 import shutil
 import tempfile
@@ -152,6 +153,7 @@ def combine(
     offset: Optional[tuple[int, int, int]] = None,
     clip: bool = False,
     fill_color: Optional[tuple[int, int, int]] = None,
+    color_resolution: int = 0,
     no_attributes: bool = False,
     memory: Union[int, str, None] = None,
     threads: int = 0,
@@ -161,29 +163,31 @@ def combine(
     """Combines two .vdag files into a new .vdag file, and returns its Dag. For two Dags, `a | b`,
     `a - b`, `a & b` and `a ^ b` do the same.
 
-    a, b           two .vdag files, as paths or Dags. Without `offset`, they must have the same
-                   grid. They must have been built with the same `hash_bits`. The result also has
-                   colors and other attributes: a cell has the value of `a` if `a` has a voxel in
-                   it, otherwise the value of `b`. For "union" and "xor", both files must have the
-                   same attributes.
-    operation      "union" sets the voxels that are set in `a` or in `b`, "minus" the voxels that
-                   are set in `a` but not in `b`, "and" the voxels that are set in both files, and
-                   "xor" the voxels that are set in exactly one of the files.
-    output         the .vdag file to write. By default it is a temporary file, which is removed when
-                   the Dag is closed or no longer used.
-    offset         three integers. They move `b`, so that its voxel 0, 0, 0 comes to this voxel of
-                   the grid of `a`. Then the grids may differ, but their voxels must have the same
-                   size.
-    clip           if True, drops the voxels of `b` that `offset` moves out of the grid of `a`. By
-                   default, such voxels are an error.
-    fill_color     for "union" and "xor", if only one file has colors: the color of the cells in
-                   which this file has no voxel, as three integers from 0 to 255 (sRGB)
-    no_attributes  if True, the result has no colors and other attributes
-    memory         memory limit, as a number of bytes or as text such as "8GiB". The default is half
-                   of the machine's memory.
-    threads        number of threads; 0 means all cores
-    force          if True, replaces an existing output
-    progress       as in build()
+    a, b              two .vdag files, as paths or Dags. Without `offset`, they must have the same
+                      grid. They must have been built with the same `hash_bits`. The result also has
+                      colors and other attributes: a cell has the value of `a` if `a` has a voxel in
+                      it, otherwise the value of `b`. For "union" and "xor", both files must have
+                      the same attributes.
+    operation         "union" sets the voxels that are set in `a` or in `b`, "minus" the voxels that
+                      are set in `a` but not in `b`, "and" the voxels that are set in both files,
+                      and "xor" the voxels that are set in exactly one of the files.
+    output            the .vdag file to write. By default it is a temporary file, which is removed
+                      when the Dag is closed or no longer used.
+    offset            three integers. They move `b`, so that its voxel 0, 0, 0 comes to this voxel
+                      of the grid of `a`. Then the grids may differ, but their voxels must have the
+                      same size.
+    clip              if True, drops the voxels of `b` that `offset` moves out of the grid of `a`.
+                      By default, such voxels are an error.
+    fill_color        for "union" and "xor", if only one file has colors: the color of the cells in
+                      which this file has no voxel, as three integers from 0 to 255 (sRGB)
+    color_resolution  maximum number of color cells per edge of the result's grid, a power of two; 0
+                      means as many as the finest color cells of the files need
+    no_attributes     if True, the result has no colors and other attributes
+    memory            memory limit, as a number of bytes or as text such as "8GiB". The default is
+                      half of the machine's memory.
+    threads           number of threads; 0 means all cores
+    force             if True, replaces an existing output
+    progress          as in build()
 
     Raises Error if an argument is invalid, if `a` and `b` do not meet these conditions, if the
     output exists, or if the operation fails.
@@ -191,6 +195,9 @@ def combine(
     paths = path_text(a), path_text(b)
     moved = None if offset is None else _voxel_of(offset)
     fill = None if fill_color is None else _color_of(fill_color)
+    cells = operator.index(color_resolution)
+    if not 0 <= cells <= 1 << 20:
+        raise Error(f"color_resolution={cells}: expected at most 2^20", "invalid_input")
     folder = tempfile.mkdtemp(prefix="voxdag-") if output is None else None
     path = f"{folder}/combined.vdag" if output is None else path_text(output)
     try:
@@ -202,6 +209,7 @@ def combine(
                 moved,
                 clip,
                 fill,
+                cells,
                 bool(no_attributes),
                 memory_text(memory),
                 thread_count(threads),

@@ -10,7 +10,9 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/color/blocks/value_region.h"
+#include "core/color/cell_values.h"
 #include "core/format/color/attribute_section_writer.h"
 #include "core/format/color/color_layout.h"
 #include "core/format/global/open_global.h"
@@ -46,6 +48,7 @@ class Source {
   Source(const voxdag_reader::File& file, Attribute attribute, uint32_t grid_levels,
          const Position& offset, FileSystem& files, MemoryBudget& budget)
       : stored_(file, attribute, files, budget),
+        attribute_(attribute),
         dag_(file),
         grid_levels_(grid_levels),
         offset_(offset) {}
@@ -60,12 +63,8 @@ class Source {
   int64_t file_level(uint32_t level) const {
     return static_cast<int64_t>(stored_.file().grid_levels()) - grid_levels_ + level;
   }
-  // Returns the level of the result whose cubes have the edge of the file's finest cells. It is
-  // negative if these cells are larger than the result's grid.
-  int64_t finest() const {
-    const int64_t up = stored_.file().grid_levels() - section().color_levels();
-    return grid_levels_ - up;
-  }
+  // Returns finest_level_of() the file.
+  int64_t finest() const { return finest_level_of(stored_.file(), attribute_, grid_levels_); }
   // True if each cube of `level` has the position of a cube of the file with the same edge, or is
   // outside the file's grid.
   bool is_aligned(uint32_t level) const {
@@ -154,6 +153,7 @@ class Source {
   }
 
   StoredSection stored_;
+  const Attribute attribute_;
   const DagView dag_;
   const uint32_t grid_levels_;  // levels of the result's grid
   const Position offset_;
@@ -177,7 +177,9 @@ class CombinedColors {
         moved_b_(from.moved_b),
         moved_b_dag_(from.moved_b),
         fill_(from.fill),
-        cancel_(cancel) {
+        cancel_(cancel),
+        levels_(from.levels),
+        names_charge_(budget, 0, "lists of materials") {
     const uint32_t levels = result_.grid_levels();
     if (attribute.from_a)
       sources_.push_back(
@@ -185,9 +187,6 @@ class CombinedColors {
     if (attribute.from_b)
       sources_.push_back(std::make_unique<Source>(from.b, attribute.attribute, levels, from.offset,
                                                   files, budget));
-    int64_t finest = kBrickLevels;
-    for (const auto& source : sources_) finest = std::max(finest, source->finest());
-    levels_ = static_cast<uint32_t>(finest);
     // Without a fill color, B has a voxel in each cell in which A has none.
     tests_b_ = attribute.from_b && fill_ && !sources_.back()->is_aligned(levels_);
     below_.resize(color_layout::tier_count(levels_));
@@ -263,7 +262,19 @@ class CombinedColors {
     std::array<uint64_t, 2> copied = {};
   };
 
+  // Joins the lists of materials. Charges the memory of the joined list, of its encoded form, and
+  // of the maps that join_names() uses.
   void join_materials() {
+    constexpr uint64_t kBytesPerName = 2 * sizeof(std::string) + 256;
+    uint64_t bytes = 0;
+    for (const auto& source : sources_) {
+      const std::vector<std::string>& names = source->section().names();
+      bytes += 2 * list_bytes(names) + kBytesPerName * names.size();
+    }
+    if (!names_charge_.try_resize(bytes))
+      throw Error(ErrorCode::kOutOfMemory,
+                  "out of memory: the lists of materials need " + std::to_string(bytes) +
+                      " bytes: expected more memory (" + option_text("memory") + ")");
     names_ = sources_[0]->section().names();
     if (sources_.size() == 1) return;
     JoinedNames joined = join_names(names_, sources_[1]->section().names());
@@ -443,7 +454,8 @@ class CombinedColors {
   // be tested, because its cubes do not align with the cells.
   bool tests_b_ = false;
   std::unique_ptr<const ResidentPages> pages_;
-  uint32_t levels_ = 0;
+  const uint32_t levels_;
+  MemoryCharge names_charge_;
   std::vector<std::string> names_;
   // indices_[s][i] is the index in names_ of material i of source s. Empty if there is only one
   // source.
@@ -454,6 +466,11 @@ class CombinedColors {
 };
 
 }  // namespace
+
+int64_t finest_level_of(const voxdag_reader::File& file, Attribute attribute,
+                        uint32_t grid_levels) {
+  return int64_t{grid_levels} - file.grid_levels() + section_of(file, attribute).color_levels();
+}
 
 void write_combined_attribute(const CombinedFiles& from, const CombinedAttribute& attribute,
                               FileSystem& files, GlobalFileWriter& out, MemoryBudget& budget,

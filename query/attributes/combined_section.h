@@ -2,20 +2,20 @@
 // (query/combine).
 //
 // A section stores a value for each set cell of the attribute's grid, the *finest cells*, and of
-// all coarser levels. The finest cells of the result have the size of the finest cells of A or of
-// B, whichever are smaller. (A and B are the two files. A file whose values are not used does not
-// count.) A finest cell of the result has
+// all coarser levels. All attributes of the result have the same finest cells (CombinedFiles). A
+// finest cell of the result has
 //
 //   1. A's value, if A has the attribute and a voxel in the cell;
 //   2. otherwise B's value, if B has the attribute and a voxel in the cell;
 //   3. otherwise the fill color.
 //
-// If the finest cells of a file are larger than the cells of the result, a cell of the result gets
-// the value of the larger cell that contains it. If B is moved and its cells do not align with the
-// result's cells, then by rule 2 a cell of the result gets the value of the cell of B that overlaps
-// it most. Only cells of B that have voxels and the size of the result's cell are considered. On
-// ties, the cell with the lowest x is used, then the cell with the lowest y, then the cell with the
-// lowest z.
+// A and B are the two files. If the finest cells of a file are larger than the cells of the result,
+// a cell of the result gets the value of the larger cell that contains it. If they are smaller, it
+// gets the value that the file stores for a cell of its size. If B is moved and its cells do not
+// align with the result's cells, then by rule 2 a cell of the result gets the value of the cell of
+// B that overlaps it most. Only cells of B that have voxels and the size of the result's cell are
+// considered. On ties, the cell with the lowest x is used, then the cell with the lowest y, then
+// the cell with the lowest z.
 //
 // The color of a coarser cell is the mean, in linear light, of the cell's finest cells. The other
 // attributes have rules for coarser cells (docs/format.md).
@@ -55,7 +55,15 @@ struct CombinedFiles {
   // The voxel of the result's grid at which B's voxel (0, 0, 0) is placed.
   std::array<int64_t, 3> offset = {};
   std::optional<voxdag_reader::Rgb> fill;
+  // Level of the finest cells of the result. Files must not have the attribute if their grid is
+  // smaller than these cells.
+  uint32_t levels = 0;
 };
+
+// Returns the level of the result whose cubes have the edge of the finest cells of an attribute of
+// `file`, which must have the attribute. The result has `grid_levels` levels. The returned level is
+// negative if these cells are larger than the result's grid.
+int64_t finest_level_of(const voxdag_reader::File& file, Attribute attribute, uint32_t grid_levels);
 
 // Writes the attribute to `out`, in which the levels must be complete. Throws Error{kCorrupt} for a
 // damaged file, Error{kLimit} for too many materials, Error{kOutOfMemory}, Error{kCanceled} and

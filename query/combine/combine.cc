@@ -14,6 +14,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/geometry/cube.h"
+#include "query/attributes/color_levels.h"
 #include "query/attributes/combined_section.h"
 #include "query/combine/count_levels.h"
 #include "query/combine/join.h"
@@ -38,19 +39,20 @@ constexpr uint64_t kWindowShare = 32;
 constexpr uint64_t kHashShare = 8;
 constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
 
-void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, bool is_moved) {
+void refuse_unequal(const FirstFile& first, const voxdag_reader::File& b, bool is_moved) {
+  const voxdag_reader::File& a = first.grid;
   const auto voxel_edge = [](const voxdag_reader::File& file) {
     return file.edge() / static_cast<double>(file.resolution());
   };
   if (!is_moved) expect_same_grid(a, b, "combined");
   if (voxel_edge(a) != voxel_edge(b))
     throw Error(ErrorCode::kInvalidInput,
-                "only files with equal voxels can be combined: a voxel of " + a.path() +
+                "only files with equal voxels can be combined: a voxel of " + first.name +
                     " has the edge " + number_text(voxel_edge(a)) + "; a voxel of " + b.path() +
                     " has the edge " + number_text(voxel_edge(b)));
   if (a.hash_bits() != b.hash_bits())
     throw Error(ErrorCode::kInvalidInput,
-                "only files with equal hash bits can be combined: " + a.path() + " has " +
+                "only files with equal hash bits can be combined: " + first.name + " has " +
                     std::to_string(a.hash_bits()) + "; " + b.path() + " has " +
                     std::to_string(b.hash_bits()));
   refuse_other_order(a);
@@ -61,13 +63,12 @@ void refuse_unequal(const voxdag_reader::File& a, const voxdag_reader::File& b, 
 // for kAnd, the attributes of A or B; for kUnion and kXor, the attributes that both files have. A
 // file without voxels counts as a file with all attributes. Throws Error{kInvalidInput} for kUnion
 // and kXor if only one file has an attribute, except for colors if `can_fill` is true.
-std::vector<CombinedAttribute> combined_attributes(const voxdag_reader::File& a,
-                                                   const voxdag_reader::File& b,
+std::vector<CombinedAttribute> combined_attributes(const FirstFile& a, const voxdag_reader::File& b,
                                                    Operation operation, bool can_fill) {
   std::vector<CombinedAttribute> combined;
-  const AttributeSet in_a = attributes_of(a), in_b = attributes_of(b);
+  const AttributeSet in_b = attributes_of(b);
   for (const AttributeTraits& row : kAttributeTable) {
-    const bool has_a = in_a.has(row.attribute), has_b = in_b.has(row.attribute);
+    const bool has_a = a.attributes.has(row.attribute), has_b = in_b.has(row.attribute);
     if (!has_a && !has_b) continue;
     if (operation == Operation::kMinus) {
       if (has_a) combined.push_back({row.attribute, true, false});
@@ -77,16 +78,17 @@ std::vector<CombinedAttribute> combined_attributes(const voxdag_reader::File& a,
       combined.push_back({row.attribute, has_a, !has_a});
       continue;
     }
-    const voxdag_reader::File& other = has_a ? b : a;
-    const bool is_complete = has_a == has_b || other.empty() || (row.is_color() && can_fill);
+    const std::string &owner = has_a ? a.name : b.path(), &other = has_a ? b.path() : a.name;
+    const bool is_other_empty = has_a ? b.empty() : a.is_empty;
+    const bool is_complete = has_a == has_b || is_other_empty || (row.is_color() && can_fill);
     if (!is_complete)
-      throw Error(ErrorCode::kInvalidInput,
-                  (has_a ? a : b).path() + " has " + row.plural + " and " + other.path() +
-                      " has none: expected " + row.plural + " in both files, " +
-                      (row.is_color()
-                           ? option_text("fill_color") + " with a color for " + other.path() + ", "
-                           : std::string()) +
-                      "or " + option_text("no_attributes") + " to combine only the voxels");
+      throw Error(
+          ErrorCode::kInvalidInput,
+          owner + " has " + row.plural + " and " + other + " has none: expected " + row.plural +
+              " in both files, " +
+              (row.is_color() ? option_text("fill_color") + " with a color for " + other + ", "
+                              : std::string()) +
+              "or " + option_text("no_attributes") + " to combine only the voxels");
     combined.push_back({row.attribute, has_a, has_b});
   }
   return combined;
@@ -156,15 +158,6 @@ NewCounts write_levels(DagInput& a, DagInput& b, NewLevels& levels, const Worksp
   return {{.voxels = total.voxels, .svo_nodes = total.nodes}, writer.dag_nodes()};
 }
 
-// Completes a temporary file and renames it to its path. The folder is not synced, because the file
-// need not survive a crash. Returns the size of the file.
-uint64_t finish_temporary(GlobalFileWriter& out, const VoxelCounts& counts, unsigned threads,
-                          const CancelToken& cancel) {
-  const uint64_t bytes = out.seal(counts, threads, cancel).bytes;
-  out.rename();
-  return bytes;
-}
-
 // Copies the levels of `from` to `out`.
 void copy_levels(DagInput& from, GlobalFileWriter& out) {
   constexpr uint64_t kChunkWords = uint64_t{1} << 16;
@@ -186,6 +179,8 @@ struct AttributeInputs {
   std::vector<CombinedAttribute> attributes;
   const voxdag_reader::File& b;
   std::array<int64_t, 3> offset = {};
+  std::optional<voxdag_reader::Rgb> fill = {};  // set only if cells need it
+  uint32_t levels = 0;                          // level of the finest cells
 };
 
 class Combination {
@@ -213,16 +208,8 @@ class Combination {
     GlobalFileWriter out = writer(work_.spec.output);
     CombineReport report = attributes_.attributes.empty() ? write_voxels(out) : write_all(out);
     if (report.voxels == 0) progress_.warn("the result has no voxels: the file will have no nodes");
-    progress_.begin_stage("write", 1, "files");
-    const GlobalFileSummary summary = out.seal(
-        {.voxels = report.voxels, .svo_nodes = report.svo_nodes}, work_.spec.threads, cancel_);
-    before_publish();
-    out.publish();
-    progress_.advance(1);
-    progress_.end_stage();
     report.grid = grid_of(a_.file());
-    report.bytes = summary.bytes;
-    report.sha256 = summary.sha256;
+    finish(out, {.voxels = report.voxels, .svo_nodes = report.svo_nodes}, before_publish, report);
     report.work_bytes += work_.scratch.bytes_written();
     return report;
   }
@@ -231,6 +218,22 @@ class Combination {
   GlobalFileWriter writer(const std::string& path) const {
     return GlobalFileWriter(work_.files, path, grid_of(a_.file()), a_.file().hash_bits(),
                             work_.spec.narrow_words);
+  }
+  void finish(GlobalFileWriter& out, const VoxelCounts& counts,
+              const std::function<void()>& before_publish, CombineReport& report) {
+    if (work_.spec.temporary) {
+      before_publish();
+      report.bytes = out.finish_temporary(counts);
+      return;
+    }
+    progress_.begin_stage("write", 1, "files");
+    const GlobalFileSummary summary = out.seal(counts, work_.spec.threads, cancel_);
+    before_publish();
+    out.publish();
+    progress_.advance(1);
+    progress_.end_stage();
+    report.bytes = summary.bytes;
+    report.sha256 = summary.sha256;
   }
   // Writes the levels of the new file. Returns a report with the numbers of voxels, nodes and
   // pairs.
@@ -256,16 +259,17 @@ class Combination {
     a_.file().release_pages();
     b_.file().release_pages();
     attributes_.b.release_pages();
+    cancel_.check();
     report.work_bytes =
-        finish_temporary(levels, {.voxels = report.voxels, .svo_nodes = report.svo_nodes},
-                         work_.spec.threads, cancel_);
+        levels.finish_temporary({.voxels = report.voxels, .svo_nodes = report.svo_nodes});
     const auto result = open_global_file(path);
     const WatchedFile watched(*result);
     watched.run([&] {
       DagInput input(*result, work_.spec.memory_bytes, cancel_);
       copy_levels(input, out);
-      const CombinedFiles from{*result,   a_.file(),          attributes_.b,
-                               b_.file(), attributes_.offset, work_.spec.fill_color};
+      const CombinedFiles from{*result,           a_.file(),          attributes_.b,
+                               b_.file(),         attributes_.offset, attributes_.fill,
+                               attributes_.levels};
       for (const CombinedAttribute& attribute : attributes_.attributes)
         write_combined_attribute(from, attribute, work_.files, out, work_.budget,
                                  work_.spec.threads, progress_, cancel_);
@@ -329,7 +333,8 @@ std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
   for (size_t i = 0; i < levels.pairs.size(); ++i)
     levels.joined.push_back(std::make_unique<JoinedLevel>(work.space, work.space));
   const VoxelCounts counts = write_levels(target, target, levels, work, out, progress).octree;
-  finish_temporary(out, counts, work.spec.threads, cancel);
+  cancel.check();
+  out.finish_temporary(counts);
   return open_global_file(path);
 }
 
@@ -337,8 +342,19 @@ std::unique_ptr<voxdag_reader::File> move_file(const voxdag_reader::File& a,
 std::unique_ptr<voxdag_reader::File> empty_file(const voxdag_reader::File& a, Workspace& work) {
   const std::string path = work.folder.path() + "/empty.vdag";
   GlobalFileWriter out(work.files, path, grid_of(a), a.hash_bits(), work.spec.narrow_words);
-  out.finish({});
+  out.finish_temporary({});
   return open_global_file(path);
+}
+
+FirstFile first_file(const voxdag_reader::File& a, const CombineSpec& spec) {
+  return {a, spec.first_name.empty() ? a.path() : spec.first_name, attributes_of(a), a.empty()};
+}
+
+[[noreturn]] void refuse_outside(const voxdag_reader::File& b, const std::string& a,
+                                 const std::string& voxels) {
+  throw Error(ErrorCode::kInvalidInput,
+              b.path() + ": " + voxels + " would be outside of the grid of " + a +
+                  ": expected another offset, or " + option_text("clip") + " to drop them");
 }
 
 CombineReport combine_moved(const voxdag_reader::File& a, const AttributeInputs& attributes,
@@ -348,11 +364,8 @@ CombineReport combine_moved(const voxdag_reader::File& a, const AttributeInputs&
   const auto moved = move_file(a, attributes, work, progress, cancel);
   const uint64_t clipped = b.voxels() - moved->voxels();
   if (clipped > 0 && !work.spec.clip)
-    throw Error(ErrorCode::kInvalidInput, b.path() + ": " + std::to_string(clipped) + " of its " +
-                                              std::to_string(b.voxels()) +
-                                              " voxels would be outside of the grid of " +
-                                              a.path() + ": expected another offset, or " +
-                                              option_text("clip") + " to drop them");
+    refuse_outside(b, first_file(a, work.spec).name,
+                   std::to_string(clipped) + " of its " + std::to_string(b.voxels()) + " voxels");
   CombineReport report =
       Combination(a, *moved, nullptr, attributes, work, progress, cancel).run(before_publish);
   report.clipped = clipped;
@@ -369,20 +382,62 @@ std::array<int64_t, 3> limited(std::array<int64_t, 3> offset) {
 
 }  // namespace
 
+AttributeSet check_combinable(const FirstFile& a, const voxdag_reader::File& b,
+                              const CombineSpec& spec) {
+  refuse_unequal(a, b, spec.offset.has_value());
+  refuse_color_resolution(a.grid, spec.color_resolution);
+  if (spec.offset && !spec.clip &&
+      has_voxels_outside(b, limited(*spec.offset), a.grid.resolution()))
+    refuse_outside(b, a.name, "some of its voxels");
+  AttributeSet attributes;
+  if (spec.attributes)
+    for (const CombinedAttribute& combined :
+         combined_attributes(a, b, spec.operation, spec.fill_color.has_value()))
+      attributes.add(combined.attribute);
+  return attributes;
+}
+
+bool needs_fill_color(const FirstFile& a, const voxdag_reader::File& b, const CombineSpec& spec) {
+  const bool is_union = spec.operation == Operation::kUnion || spec.operation == Operation::kXor;
+  const bool has_a = a.attributes.has(Attribute::kColor),
+             has_b = attributes_of(b).has(Attribute::kColor);
+  return spec.attributes && is_union && has_a != has_b && !(has_a ? b.empty() : a.is_empty);
+}
+
+namespace {
+
+// Checks the files, and chooses the attributes of the result. Warns if spec.fill_color is not used.
+AttributeInputs attribute_inputs(const voxdag_reader::File& a, const voxdag_reader::File& b,
+                                 const CombineSpec& spec, Progress& progress) {
+  const FirstFile first = first_file(a, spec);
+  check_combinable(first, b, spec);
+  AttributeInputs inputs{{}, b, limited(spec.offset.value_or(std::array<int64_t, 3>{}))};
+  if (needs_fill_color(first, b, spec))
+    inputs.fill = spec.fill_color;
+  else if (spec.fill_color)
+    progress.warn(option_text("fill_color") +
+                  " has no effect: it is used by a union or a symmetric difference if exactly one "
+                  "of the files has colors");
+  if (!spec.attributes) return inputs;
+  inputs.attributes = combined_attributes(first, b, spec.operation, spec.fill_color.has_value());
+  inputs.levels =
+      color_levels_of(a, first.name, b, inputs.attributes, spec.color_resolution, progress);
+  return inputs;
+}
+
+}  // namespace
+
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel) {
-  refuse_unequal(a, b, spec.offset.has_value());
-  AttributeInputs attributes{{}, b, limited(spec.offset.value_or(std::array<int64_t, 3>{}))};
-  if (spec.attributes)
-    attributes.attributes = combined_attributes(a, b, spec.operation, spec.fill_color.has_value());
-  LockedOutputs outputs(files, {{spec.output}, {a.path(), b.path()}, spec.replace});
   const WatchedFile watched_a(a), watched_b(b);
   const auto check_readable = [&] {
     watched_a.check_readable();
     watched_b.check_readable();
   };
   const auto run = [&] {
+    const AttributeInputs attributes = attribute_inputs(a, b, spec, progress);
+    LockedOutputs outputs(files, {{spec.output}, {a.path(), b.path()}, spec.replace});
     Workspace work(spec, outputs.files());
     if (spec.offset) return combine_moved(a, attributes, work, progress, cancel, check_readable);
     return Combination(a, b, nullptr, attributes, work, progress, cancel).run(check_readable);
@@ -393,14 +448,19 @@ CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b
 CombineReport cut(const voxdag_reader::File& a, const Shape& shape, const CombineSpec& spec,
                   FileSystem& files, Progress& progress, const CancelToken& cancel) {
   refuse_other_order(a);
+  refuse_color_resolution(a, spec.color_resolution);
   LockedOutputs outputs(files, {{spec.output}, {a.path()}, spec.replace});
   const WatchedFile watched(a);
   const auto run = [&] {
     Workspace work(spec, outputs.files());
     const auto empty = empty_file(a, work);
     AttributeInputs attributes{{}, *empty};
-    if (spec.attributes)
-      attributes.attributes = combined_attributes(a, *empty, Operation::kMinus, false);
+    if (spec.attributes) {
+      attributes.attributes =
+          combined_attributes(first_file(a, spec), *empty, Operation::kMinus, false);
+      attributes.levels = color_levels_of(a, first_file(a, spec).name, *empty,
+                                          attributes.attributes, spec.color_resolution, progress);
+    }
     return Combination(a, *empty, &shape, attributes, work, progress, cancel).run([&] {
       watched.check_readable();
     });

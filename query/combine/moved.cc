@@ -5,9 +5,46 @@
 
 #include "core/base/host_device.h"
 #include "core/dag/brick.h"
+#include "core/format/global/open_global.h"
 
 namespace voxdag::query {
 namespace {
+
+// See has_voxels_outside().
+class OutsideSearch {
+ public:
+  OutsideSearch(const voxdag_reader::File& b, const std::array<int64_t, 3>& offset,
+                int64_t resolution)
+      : b_(b), offset_(offset), resolution_(resolution) {}
+  bool find() { return !b_.empty() && find(0, 0, offset_, b_.resolution()); }
+
+ private:
+  static constexpr uint64_t kMaxCubes = uint64_t{1} << 18;
+
+  // `place` is the place (open_global.h) of a cube with voxels, `low` its lowest voxel in the grid
+  // of the first file.
+  bool find(uint32_t level, uint64_t place, const std::array<int64_t, 3>& low, int64_t edge) {
+    bool is_inside = true;
+    for (const int64_t at : low) {
+      if (at + edge <= 0 || at >= resolution_) return true;
+      is_inside = is_inside && at >= 0 && at + edge <= resolution_;
+    }
+    if (is_inside || ++cubes_ > kMaxCubes) return false;
+    const uint32_t mask = child_mask_at(b_, level, place);
+    for (int i = 0; i < 8; ++i)
+      if (mask >> i & 1 && find(level + 1, child_place_at(b_, level, place, i),
+                                {low[0] + (i >> 2 & 1) * edge / 2, low[1] + (i >> 1 & 1) * edge / 2,
+                                 low[2] + (i & 1) * edge / 2},
+                                edge / 2))
+        return true;
+    return false;
+  }
+
+  const voxdag_reader::File& b_;
+  const std::array<int64_t, 3> offset_;
+  const int64_t resolution_;
+  uint64_t cubes_ = 0;
+};
 
 // Returns the position, 0 or 1, of a cube on `axis` in a block of 2 x 2 x 2 cubes. `index` is the
 // cube's index in this block, 4x + 2y + z.
@@ -156,6 +193,11 @@ std::vector<std::unique_ptr<PairLevel>> MovedLevels::descend(BrickResults& brick
   add_bricks(open, bricks);
   levels.push_back(std::move(open.result));
   return levels;
+}
+
+bool has_voxels_outside(const voxdag_reader::File& file, const std::array<int64_t, 3>& offset,
+                        int64_t resolution) {
+  return OutsideSearch(file, offset, resolution).find();
 }
 
 }  // namespace voxdag::query

@@ -83,4 +83,11 @@ class MovedLevels {
   const SpillSpace& space_;
 };
 
+// True if a voxel of `file` is outside of a grid with `resolution` voxels per edge when the file's
+// voxel (0, 0, 0) is placed at the grid's voxel `offset`. Visits only cubes at the grid's faces,
+// and at most 2^18 of them: returns false if it finds no such voxel in these. Throws
+// voxdag_reader::Error.
+bool has_voxels_outside(const voxdag_reader::File& file, const std::array<int64_t, 3>& offset,
+                        int64_t resolution);
+
 }  // namespace voxdag::query

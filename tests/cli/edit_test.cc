@@ -69,16 +69,17 @@ TEST_F(Edit, AddEqualsOneBuild) {
 // A box is extracted to a cropped file and cut from the original file. Pasting the cropped file
 // into the hole restores the original bytes.
 TEST_F(Edit, CutAndPaste) {
-  const std::string region = "32,0,64,64,32,96";
+  const std::string region = "32,32,64,64,64,96";
   run_json({"edit", "a.vdag", "--cut", "box:" + region, "-o", "hole.vdag"});
   run_json({"extract", "a.vdag", "--region", region, "--crop", "-o", "part.vdag"});
   EXPECT_LT(run_json({"info", "part.vdag"})["resolution"], 128);
-  run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,0,64", "-o", "c.vdag"});
+  EXPECT_GT(run_json({"info", "part.vdag"})["voxels"], 0);
+  run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,32,64", "-o", "c.vdag"});
   expect_equal("c.vdag", "a.vdag");
   // One command applies its edits in the order cut, add, paste, whatever the order of its options.
   // So it cuts the box first and then restores it.
-  run_json(
-      {"edit", "a.vdag", "--paste", "part.vdag@32,0,64", "--cut", "box:" + region, "-o", "d.vdag"});
+  run_json({"edit", "a.vdag", "--paste", "part.vdag@32,32,64", "--cut", "box:" + region, "-o",
+            "d.vdag"});
   expect_equal("d.vdag", "a.vdag");
 }
 
@@ -97,11 +98,11 @@ TEST_F(Edit, Colors) {
   const auto different = [&](const std::string& x, const std::string& y) {
     return Json::parse(run({"diff", x, y, "--color", "--json"}).out)["colors"]["different"];
   };
-  const std::string region = "32,0,64,64,32,96";
+  const std::string region = "32,32,64,64,64,96";
   run_json({"edit", "a.vdag", "--cut", "box:" + region, "-o", "hole.vdag"});
   EXPECT_EQ(different("hole.vdag", "a.vdag"), 0);
   run_json({"extract", "a.vdag", "--region", region, "--crop", "-o", "part.vdag"});
-  run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,0,64", "-o", "back.vdag"});
+  run_json({"edit", "hole.vdag", "--paste", "part.vdag@32,32,64", "-o", "back.vdag"});
   EXPECT_EQ(different("back.vdag", "a.vdag"), 0);
   const Json both = build({"a.glb", "b.glb"}, "both.vdag", {}, {"--color"});
   const Json added = run_json({"edit", "a.vdag", "--add", "b.glb", "-o", "added.vdag"});
@@ -117,6 +118,30 @@ TEST_F(Edit, Colors) {
       {"edit", "a.vdag", "--cut", "box:0,0,0,128,128,128", "--add", "b.glb", "-o", "only.vdag"});
   build({"b.glb"}, "b.vdag", {}, {"--color", "--color-resolution", "64"});
   expect_equal("only.vdag", "b.vdag");
+}
+
+// Parts that cannot be pasted are refused before the first edit. The messages name the files that
+// the user gave, and not the files of earlier edits.
+TEST_F(Edit, ChecksPartsFirst) {
+  run_json({"extract", "a.vdag", "--region", "32,32,64,64,64,96", "--crop", "-o", "part.vdag"});
+  run_json({"extract", "a.vdag", "-o", "coarse.vdag", "--level", "6"});
+  build({"b.glb"}, "colored.vdag", {}, {"--color"});
+  const auto expect_refused = [&](const std::string& expected, const std::string& part) {
+    const Answer answer = run({"edit", "a.vdag", "--cut", "sphere:64,64,64,30", "--add", "none.glb",
+                               "--paste", "part.vdag@1,2,3", "--paste", part, "-o", "x.vdag"});
+    EXPECT_EQ(answer.status, 2);
+    EXPECT_NE(answer.err.find(expected), std::string::npos) << answer.err;
+    EXPECT_EQ(answer.err.find(".work-"), std::string::npos) << answer.err;
+  };
+  expect_refused("only files with equal voxels can be combined: a voxel of a.vdag has the edge 16",
+                 "coarse.vdag@0,0,0");
+  expect_refused("colored.vdag has colors and a.vdag has none", "colored.vdag@0,0,0");
+  expect_refused("part.vdag: some of its voxels would be outside of the grid of a.vdag",
+                 "part.vdag@120,0,0");
+  const Answer unused = run(
+      {"edit", "a.vdag", "--paste", "part.vdag@1,2,3", "--fill-color", "ff8000", "-o", "x.vdag"});
+  EXPECT_EQ(unused.status, 0);
+  EXPECT_NE(unused.err.find("--fill-color has no effect"), std::string::npos) << unused.err;
 }
 
 TEST_F(Edit, RefusesBadArguments) {

@@ -113,6 +113,7 @@ struct GlobalFileWriter::State {
   void pad(uint64_t content_end);
   void put_sections(HeaderPage& header) const;
   HeaderPage header(const VoxelCounts& counts, std::span<const std::byte> table) const;
+  HeaderPage write_header(const VoxelCounts& counts, std::span<const uint64_t> checksums);
   std::string digest(const HeaderPage& header, std::span<const uint64_t> checksums,
                      unsigned threads, const CancelToken& cancel) const;
   [[noreturn]] void damaged(uint64_t at) const {
@@ -432,27 +433,42 @@ GlobalFileFrame GlobalFileWriter::frame(const VoxelCounts& counts) const {
   return {{header.bytes().begin(), header.bytes().end()}, {table.begin(), table.end()}};
 }
 
+// Writes the checksum table and the header, which the file needs to be complete. Returns the
+// header.
+HeaderPage GlobalFileWriter::State::write_header(const VoxelCounts& counts,
+                                                 std::span<const uint64_t> checksums) {
+  if (level_open || placed || section_open || !complete())
+    throw Error(ErrorCode::kCorrupt,
+                path +
+                    (section_open ? ": the attribute section"
+                                  : ": level " + std::to_string(current_level())) +
+                    " is not finished");
+  create_file();
+  const auto table = std::as_bytes(checksums);
+  file->write_at(end, table);
+  HeaderPage page = header(counts, table);
+  file->write_at(0, page.bytes());
+  return page;
+}
+
 GlobalFileSummary GlobalFileWriter::seal(const VoxelCounts& counts, unsigned threads,
                                          const CancelToken& cancel) {
   State& s = *state_;
-  if (s.level_open || s.placed || s.section_open || !s.complete())
-    throw Error(ErrorCode::kCorrupt,
-                s.path +
-                    (s.section_open ? ": the attribute section"
-                                    : ": level " + std::to_string(s.current_level())) +
-                    " is not finished");
-  s.create_file();
   const std::vector<uint64_t> checksums = s.block_checksums.values();
-  const auto table = std::as_bytes(std::span(checksums));
-  s.file->write_at(s.end, table);
-  const HeaderPage header = s.header(counts, table);
-  s.file->write_at(0, header.bytes());
+  const HeaderPage header = s.write_header(counts, checksums);
   // digest() reads the file while a background thread waits for the disk.
   std::future<void> synced = run_in_background([&s] { s.file->sync(); });
-  const GlobalFileSummary summary{s.end + table.size(),
+  const GlobalFileSummary summary{s.end + std::as_bytes(std::span(checksums)).size(),
                                   s.digest(header, checksums, threads, cancel)};
   synced.get();
   return summary;
+}
+
+uint64_t GlobalFileWriter::finish_temporary(const VoxelCounts& counts) {
+  const std::vector<uint64_t> checksums = state_->block_checksums.values();
+  state_->write_header(counts, checksums);
+  rename();
+  return state_->end + std::as_bytes(std::span(checksums)).size();
 }
 
 void GlobalFileWriter::publish() {

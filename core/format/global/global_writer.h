@@ -141,6 +141,9 @@ class GlobalFileWriter {
   // and the SHA-256 of the file.
   GlobalFileSummary seal(const VoxelCounts& counts, unsigned threads = 1,
                          const CancelToken& cancel = CancelToken());
+  // Completes a temporary file, and renames it to its final name. Writes checksums and header, but
+  // neither syncs the file nor reads it back. Returns the size of the file.
+  uint64_t finish_temporary(const VoxelCounts& counts);
   // Renames the sealed file to its final name and syncs the folder.
   void publish();
   // Renames the sealed file to its final name. The caller syncs the folder.

@@ -112,7 +112,7 @@ TEST_F(CombineMoved, Refusals) {
     return error.message();
   };
   const std::string text = message("b");
-  EXPECT_NE(text.find("384 of its 512 voxels would be outside of the grid"), std::string::npos);
+  EXPECT_NE(text.find("some of its voxels would be outside of the grid"), std::string::npos);
   EXPECT_TRUE(text.ends_with(": expected another offset, or --clip to drop them")) << text;
   EXPECT_TRUE(message("other").starts_with("only files with equal voxels can be combined"));
   expect_files({"a", "b", "other"});
