@@ -23,8 +23,9 @@ class DagExport {
   // Like export_dag(), but with this selection and output instead of the request's.
   ExportReport write(FileSystem& files, const Selection& selection, const std::string& output,
                      Progress& progress, const CancelToken& cancel);
-  // True if the selection has a set cell.
-  bool has_voxels(const Selection& selection) const;
+  // True if an export of the selection has contents: a set cell, or for a level set, a set cell at
+  // a distance of at most the band's width (level_set/narrow_band.h).
+  bool has_contents(const Selection& selection) const;
   const DagView& dag() const { return dag_; }  // in the axes of the file
 
  private:
@@ -36,7 +37,11 @@ class DagExport {
   // Sets filled_ to the filled DAG of the grid with 2^grid_levels cells per edge, unless the last
   // call was for the same grid.
   void fill(const DagView& dag, uint32_t grid_levels, const CancelToken& cancel);
+  // Throws Error{kInvalidInput} if the voxels of the complete grid are a surface without an inside,
+  // which has no level set. Does nothing after a call that has not thrown.
+  void require_inside(const CancelToken& cancel);
 
+  bool has_inside_ = false;          // set by require_inside()
   std::optional<TurnedDag> turned_;  // made by the first write() if turn_ changes the axes
   std::optional<FilledDag> filled_;  // filled DAG of the last written grid, for --outside
 };

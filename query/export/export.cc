@@ -10,6 +10,7 @@
 #include "query/dag/locked_outputs.h"
 #include "query/export/dag_export.h"
 #include "query/export/export_job.h"
+#include "query/export/level_set/narrow_band.h"
 #include "query/lookup/bricks.h"
 
 namespace voxdag::query {
@@ -109,10 +110,22 @@ DagExport::DagExport(const voxdag_reader::File& file, const ExportRequest& reque
   check_export_options(*request.format, request.options);
 }
 
-bool DagExport::has_voxels(const Selection& selection) const {
+bool DagExport::has_contents(const Selection& selection) const {
+  if (request_.options.grid == GridKind::kSdf)
+    return has_band(dag_, selection, request_.options.band_width());
   bool found = false;
   for_each_brick(dag_, selection, [&](const Brick&) { return !(found = true); });
   return found;
+}
+
+void DagExport::require_inside(const CancelToken& cancel) {
+  if (!has_inside_ && !has_inside(dag_, cancel))
+    throw Error(ErrorCode::kInvalidInput,
+                file_.path() + ": the voxels are a surface without an inside, so " +
+                    option_text("grid", "sdf") +
+                    " has no signs: expected a file of voxdag build --solid RULE, or " +
+                    option_text("grid", "density"));
+  has_inside_ = true;
 }
 
 void DagExport::fill(const DagView& dag, uint32_t grid_levels, const CancelToken& cancel) {
@@ -150,6 +163,7 @@ ExportReport DagExport::write(FileSystem& files, const Selection& selection,
                         request_.options,
                         filled_ ? &filled_->view() : nullptr};
     if (dag_.empty()) refuse_empty(job);
+    if (request_.options.grid == GridKind::kSdf) require_inside(cancel);
     return request_.format->write(job);
   };
   ExportReport report = watched.run([&] { return naming_file(file_.path(), write); });

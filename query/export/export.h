@@ -53,6 +53,8 @@ struct ExportOptions {
   bool compact = false;     // npz: leave out arrays that can be computed from the others
   bool outside = false;     // glb: only faces that are visible from outside
   bool watertight = false;  // glb: a closed mesh without T-junctions (surface_mesh.h)
+
+  int band_width() const { return band.value_or(3); }
 };
 
 // The description from which the options of the command line, the service and Python derive.

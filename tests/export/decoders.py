@@ -375,22 +375,6 @@ def vdb(path, grid):
     return cells
 
 
-def vdb_level_set(path, grid, low, edge, band):
-    """Returns the values and the active states of the cube of `edge` cells at `low`."""
-    read = pyopenvdb.read(path, "surface")
-    assert read.gridClass == pyopenvdb.GridClass.LEVEL_SET
-    assert abs(read.background - band * grid.voxel) < 1e-6 * grid.voxel
-    corner = numpy.array(read.transform.indexToWorld((0, 0, 0)))
-    assert numpy.abs(corner - (grid.origin + grid.voxel / 2)).max() < 1e-6 * grid.voxel
-    values = numpy.zeros((edge,) * 3, numpy.float32)
-    read.copyToArray(values, ijk=low)
-    active = numpy.zeros((edge,) * 3, bool)
-    for item in read.citerOnValues():
-        assert item.min == item.max, "an active tile"
-        active[tuple(numpy.array(item.min) - low)] = True
-    return values, active
-
-
 def nvdb(path, grid, reader):
     listed = subprocess.run([reader, path], capture_output=True, check=True)
     return grid.cells(numpy.frombuffer(listed.stdout, "<f8").reshape(-1, 3))

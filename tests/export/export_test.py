@@ -35,6 +35,7 @@ except ImportError:
     skip("numpy here (python3-numpy)")
 
 import decoders  # noqa: E402
+import level_sets  # noqa: E402
 
 SUFFIXES = {"hashdag": ".basic_dag.dag.bin", "voxel": ".voxel.json"}
 # Each export: the resolution of the built file, and the options of the export.
@@ -60,7 +61,11 @@ TURN_CASES = [(64, []), (256, ["--level", "7", "--region", "9,0,30,90,101,83"])]
 SOLID_CASES = [[], ["--level", "5"], ["--region", "5,0,16,64,49,60"]]
 
 # Options of exports of the solid with --grid sdf.
-LEVEL_SET_CASES = [["--level", "5"], ["--level", "4", "--band", "2"]]
+LEVEL_SET_CASES = [
+    ["--level", "5"],
+    ["--level", "4", "--band", "2"],
+    ["--level", "5", "--band", "2", "--chunks", "4"],
+]
 
 
 class Grid:
@@ -228,8 +233,9 @@ class Test:
         full, band = resolution.bit_length() - 1, int(given.get("--band", 3))
         levels = int(given.get("--level", full))
         grid = Grid(info, levels, None)
-        output = "level_set.vdb"
-        self.run("export", path, "--to", "vdb", "--grid", "sdf", "-o", output, "--force", *options)
+        output = "level_set" + ("" if "--chunks" in given else "." + self.name)
+        sdf = ["--to", self.name, "--grid", "sdf", "-o", output, "--force"]
+        self.run("export", path, *sdf, *options)
         # The cells of the grid and a margin, in which all cells are empty.
         edge = grid.resolution + 4 * band
         is_set = numpy.zeros((edge,) * 3, bool)
@@ -246,10 +252,42 @@ class Test:
             differs = numpy.roll(is_set, step, (0, 1, 2)) != is_set
             squares[differs & (squares > square)] = square
         expected = numpy.sqrt(squares) / 2 * grid.voxel * numpy.where(is_set, -1, 1)
-        values, active = decoders.vdb_level_set(output, grid, [-2 * band] * 3, edge, band)
-        assert numpy.abs(values - expected).max() < 1e-5 * grid.voxel
-        assert (active == (squares < limit)).all()
-        print(f"level set {' '.join(options)}: {active.sum()} active voxels")
+        in_band = squares < limit
+
+        def check(file, part):
+            decode = getattr(level_sets, self.name)
+            values, active = decode(file, grid, [-2 * band] * 3, edge, band, *self.tools)
+            assert numpy.abs(values - expected)[part].max() < 1e-5 * grid.voxel
+            assert (active[part] == in_band[part]).all()
+            return active[part].sum()
+
+        if "--chunks" in given:
+            self.check_chunks(output, grid, band, is_set, in_band, check)
+        else:
+            assert check(output, ...) == in_band.sum()
+        print(f"level set {' '.join(options)}: {in_band.sum()} active voxels")
+
+    def check_chunks(self, folder, grid, band, is_set, in_band, check):
+        """Checks the chunks of a level set. A chunk at the border of the grid also has the part of
+        the band that is outside the grid."""
+        with open(folder + "/manifest.json", encoding="utf-8") as file:
+            manifest = json.load(file)
+        kinds = {"inside": 0, "without voxels": 0}
+        rest = in_band.copy()
+        for chunk in manifest["levels"][0]["chunks"]:
+            low, high = numpy.array(chunk["low"]), numpy.array(chunk["high"])
+            own = tuple(slice(2 * band + a, 2 * band + b) for a, b in zip(low, high))
+            low = numpy.where(low == 0, -band, low)
+            high = numpy.where(high == grid.resolution, high + band, high)
+            part = tuple(slice(2 * band + a, 2 * band + b) for a, b in zip(low, high))
+            check(os.path.join(folder, chunk["files"][0]["path"]), part)
+            assert chunk["voxels"] == is_set[own].sum()
+            rest[part] = False
+            kinds["inside"] += is_set[own].all() and not in_band[own].any()
+            kinds["without voxels"] += not is_set[own].any()
+        assert not rest.any(), "cells of the band are in no chunk"
+        assert all(kinds.values()), kinds
+        print("chunks:", kinds)
 
     def check_refusals(self):
         """Checks that existing files and empty selections are refused, and leave no other files."""
@@ -287,7 +325,7 @@ def main():
             test.check(resolution, options)
         for resolution, options in TURN_CASES:
             test.check(resolution, options, turn="y" if name == "vox" else "z")
-        if name == "vdb":
+        if name in ("vdb", "nvdb"):
             for options in LEVEL_SET_CASES:
                 test.check_level_set(64, options)
         test.check_colors()

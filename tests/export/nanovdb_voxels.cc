@@ -1,10 +1,15 @@
-// nanovdb_voxels FILE.nvdb [GRID]: writes the world coordinates of voxels as doubles. Without GRID,
-// writes all active voxels of the first grid of the file, in leaves and in tiles. This grid is a
-// mask, or has floats, all of which must be 1. With GRID, writes the voxels of the grid with this
-// name, each followed by its three values. The program reads the file with NanoVDB's own reader.
+// nanovdb_voxels FILE.nvdb [GRID [LOW EDGE]]: writes the world coordinates of voxels as doubles.
+// Without GRID, writes all active voxels of the first grid of the file, in leaves and in tiles.
+// This grid is a mask, or has floats, all of which must be 1. With GRID, writes the voxels of the
+// grid with this name, each followed by its three values. With LOW and EDGE, GRID is a level set.
+// Then writes its background, the world coordinates of cell (0, 0, 0), and two numbers for each
+// cell of the cube of EDGE^3 cells at (LOW, LOW, LOW): its value, and 1 if it is active, otherwise
+// 0. The program reads the file with NanoVDB's own reader.
 #include <nanovdb/util/IO.h>
 
 #include <cstdio>
+#include <cstdlib>
+#include <vector>
 
 namespace {
 
@@ -46,9 +51,29 @@ bool list(const nanovdb::NanoGrid<Value>* grid, const Write& write) {
   return count == grid->activeVoxelCount();
 }
 
+bool list_cube(const nanovdb::NanoGrid<float>* grid, int low, int edge) {
+  if (!grid || !grid->isLevelSet()) return false;
+  const auto& tree = grid->tree();
+  const nanovdb::Vec3d corner = grid->indexToWorld(nanovdb::Vec3d(0, 0, 0));
+  std::vector<double> numbers = {tree.background(), corner[0], corner[1], corner[2]};
+  for (int x = low; x < low + edge; ++x)
+    for (int y = low; y < low + edge; ++y)
+      for (int z = low; z < low + edge; ++z) {
+        const nanovdb::Coord cell(x, y, z);
+        numbers.push_back(tree.getValue(cell));
+        numbers.push_back(tree.isActive(cell) ? 1 : 0);
+      }
+  return std::fwrite(numbers.data(), sizeof(double), numbers.size(), stdout) == numbers.size();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc == 5) {
+    const auto handle = nanovdb::io::readGrid(argv[1], std::string(argv[2]));
+    const bool done = list_cube(handle.grid<float>(), std::atoi(argv[3]), std::atoi(argv[4]));
+    return done && std::fflush(stdout) == 0 ? 0 : 1;
+  }
   if (argc != 2 && argc != 3) return 2;
   const auto handle = argc == 3 ? nanovdb::io::readGrid(argv[1], std::string(argv[2]))
                                 : nanovdb::io::readGrid(argv[1]);

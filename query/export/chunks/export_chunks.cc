@@ -25,16 +25,22 @@ struct Chunk {
   Selection selection;
 };
 
-// Finds the chunks of one level that have voxels. `edge` is the edge of a chunk, in cells.
+// Finds the chunks of one level that have contents (DagExport::has_contents()). `edge` is the edge
+// of a chunk, in cells.
 class ChunkFinder {
  public:
   ChunkFinder(const DagExport& dag, const Selection& selection, uint64_t edge)
       : dag_(dag), selection_(selection), edge_(static_cast<int64_t>(edge)) {}
 
-  // Returns the chunks that have voxels, in Morton order.
-  std::vector<Chunk> find() {
+  // Returns the chunks, in Morton order. With `is_level_set`, the export is a level set, which also
+  // has contents in some chunks without set cells.
+  std::vector<Chunk> find(bool is_level_set) {
     const int64_t edge = int64_t{1} << selection_.grid_levels;
-    if (!dag_.dag().empty()) visit(0, dag_.dag().root(), {0, 0, 0}, edge);
+    if (dag_.dag().empty()) return {};
+    if (is_level_set)
+      visit_band({0, 0, 0}, edge);
+    else
+      visit(0, dag_.dag().root(), {0, 0, 0}, edge);
     return std::move(chunks_);
   }
 
@@ -48,6 +54,13 @@ class ChunkFinder {
         visit(depth + 1, dag_.dag().content(depth, children, i), child_corner(corner, i, edge / 2),
               edge / 2);
   }
+  void visit_band(const Position& corner, int64_t edge) {
+    if (!selection_.region.intersects(corner, edge)) return;
+    if (edge <= edge_) return add(corner, edge);
+    const Region cube{corner, {corner[0] + edge, corner[1] + edge, corner[2] + edge}};
+    if (!dag_.has_contents({selection_.grid_levels, cube})) return;
+    for (int i = 0; i < 8; ++i) visit_band(child_corner(corner, i, edge / 2), edge / 2);
+  }
   void add(const Position& corner, int64_t edge) {
     Chunk chunk{{}, {selection_.grid_levels, selection_.region}};
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -56,7 +69,7 @@ class ChunkFinder {
       region.low[axis] = std::max(region.low[axis], corner[axis]);
       region.high[axis] = std::min(region.high[axis], corner[axis] + edge);
     }
-    if (dag_.has_voxels(chunk.selection)) chunks_.push_back(chunk);
+    if (dag_.has_contents(chunk.selection)) chunks_.push_back(chunk);
   }
 
   const DagExport& dag_;
@@ -94,10 +107,11 @@ class ChunkWriter {
   ChunksReport run(Progress& progress, const CancelToken& cancel) {
     std::vector<std::vector<Chunk>> levels;
     uint64_t count = 0;
+    const bool is_level_set = request_.request.options.grid == GridKind::kSdf;
     const Selection& selected = request_.request.selection;
     for (uint32_t up = 0; up < request_.levels; ++up) {
       const Selection selection = coarser(selected, selected.grid_levels - up);
-      levels.push_back(ChunkFinder(dag_, selection, request_.edge).find());
+      levels.push_back(ChunkFinder(dag_, selection, request_.edge).find(is_level_set));
       count += levels.back().size();
     }
     progress.begin_stage("export", count, "chunks");

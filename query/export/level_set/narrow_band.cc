@@ -100,6 +100,15 @@ BandTile::Contents contents_of(const DagView& dag, uint32_t grid_levels, const R
   return BoxContents(dag, grid_levels, box).find();
 }
 
+bool has_band(const DagView& dag, const Selection& selection, int width) {
+  Region box = selection.region;
+  for (size_t a = 0; a < 3; ++a) {
+    box.low[a] -= width;
+    box.high[a] += width;
+  }
+  return contents_of(dag, selection.grid_levels, box) != BandTile::Contents::kEmpty;
+}
+
 BandTile::BandTile(int64_t edge, int width)
     : edge_(edge),
       width_(width),

@@ -70,6 +70,10 @@ class BandTile {
 // have at least 4 cells per edge.
 BandTile::Contents contents_of(const DagView& dag, uint32_t grid_levels, const Region& box);
 
+// True if a set cell is at most `width` cells away from the selection along every axis. Otherwise
+// no cell of the selection is set or in the band.
+bool has_band(const DagView& dag, const Selection& selection, int width);
+
 // The implementation of for_each_band_part().
 template <class VisitLeaf, class VisitFull>
 class BandWalk {

@@ -10,15 +10,10 @@
 #include <set>
 #include <vector>
 
-#include "core/base/error.h"
-#include "core/base/options/option_text.h"
 #include "query/export/level_set/narrow_band.h"
 #include "query/export/vdb/vdb_grid.h"
 
 namespace voxdag::query {
-
-// Returns the half width of a level set's band, in voxels.
-inline int band_of(const ExportJob& job) { return job.options.band.value_or(3); }
 
 // Like vdb_size(), for the tree of a level set. Does not count voxels.
 template <class Steps>
@@ -39,7 +34,7 @@ VdbSize level_set_size(const ExportJob& job, const Selection& selection, const V
     return size.bytes <= limit;
   };
   for_each_band_part(
-      job.dag, selection, band_of(job),
+      job.dag, selection, job.options.band_width(),
       [&](const Position& low, const Position&, BandTile&) {
         size.bytes += node.leaf;
         ++size.leaves;
@@ -51,15 +46,9 @@ VdbSize level_set_size(const ExportJob& job, const Selection& selection, const V
 
 // Returns the level set of the selected voxels. Leaves have exact distances, limited to the width
 // of the band. In a tile of the OpenVDB tree (a cube with one value), only the sign of the value is
-// right. Throws Error{kInvalidInput} if the file's voxels are a surface without an inside.
+// right.
 inline openvdb::FloatGrid::Ptr make_level_set(const ExportJob& job, uint64_t leaves) {
-  if (!has_inside(job.dag, job.cancel))
-    throw Error(ErrorCode::kInvalidInput,
-                job.file.path() + ": the voxels are a surface without an inside, so " +
-                    option_text("grid", "sdf") +
-                    " has no signs: expected a file of voxdag build --solid RULE, or " +
-                    option_text("grid", "density"));
-  const int width = band_of(job), limit = 4 * width * width;
+  const int width = job.options.band_width(), limit = 4 * width * width;
   const Region domain = band_domain(job.selection, width);
   const auto background = static_cast<float>(width * job.cell_edge());
   const auto grid = empty_vdb_grid<openvdb::FloatGrid>(job, "surface");

@@ -153,7 +153,10 @@ ChargedVdb charge_vdb(const ExportJob& job, const VoxelGrid& grid, const VdbNode
   };
   VdbSize size = size_of(job.selection, ExportStage(job, "count", 0, "bricks"));
   if (grid.is_level_set) size.voxels = count_voxels(job, job.selection, UINT64_MAX);
-  if (size.voxels == 0) refuse_empty(job);
+  const bool has_contents = grid.is_level_set
+                                ? has_band(job.dag, job.selection, job.options.band_width())
+                                : size.voxels != 0;
+  if (!has_contents) refuse_empty(job);
   if (size.bytes > limit)
     refuse_size(
         job,
