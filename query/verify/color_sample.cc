@@ -19,6 +19,11 @@
 namespace voxdag::query {
 namespace {
 
+// Memory of the cells of a region after baking: their sums in Morton order, and their encoding
+// (RegionEncoder), whose next coarser level has at most an eighth of a complete region's cells.
+constexpr uint64_t kCellsBytes =
+    uint64_t{color::RegionCells::kMaxCells} * (sizeof(ColoredCell) + 10 + 81 / 8 + 1);
+
 using voxdag_reader::ColorRegion;
 using voxdag_reader::ColorSection;
 using voxdag_reader::ColorTier;
@@ -214,7 +219,8 @@ ColorSampleReport compare_sampled_colors(const voxdag_reader::File& file, const 
                                             progress, cancel, cutouts);
   progress.end_stage();
 
-  const MemoryCharge baking(budget, RegionBaker<TextureReader>::kMaxBytes, "baking colors");
+  const MemoryCharge baking(budget, RegionBaker<TextureReader>::kMaxBytes + kCellsBytes,
+                            "baking colors");
   MemoryCharge values_charge(budget, 0, "normals and materials of a sampled region");
   const auto reader = textures->open(budget.available() / 2);
   RegionBaker<TextureReader> baker(grid, textures->materials(), *reader, attributes, cutouts);

@@ -45,7 +45,7 @@
 //                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet
 //                 ColorMemory, for every worker     7/8 of free / workers
-//                   a region, and the encoded       1/2, 12 to 46 MiB            CubeBaker
+//                   a region, and the encoded       1/2, 12 to 47 MiB            CubeBaker
 //                     regions of its cube
 //                   other attributes of a region    16 MiB or more, if any       CubeBaker
 //                   surfaces of a cube              2/3 of the rest              CubeBaker

@@ -7,7 +7,7 @@
 namespace voxdag {
 
 // Adds the color of `count` cells of the level that is `up` levels above the region's finest level.
-// They have the same parent, and `code` is the code of one of them.
+// They have the same parent, and `code` is the code of any child of this parent.
 inline void RegionEncoder::add_colors(uint32_t up, uint32_t code, size_t count, Color color) {
   constexpr uint32_t kPrefixBits = 3 * kPrefixLevels;
   uint32_t& added = region_.counts[up];

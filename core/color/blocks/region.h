@@ -56,10 +56,10 @@ class RegionEncoder {
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
   // Reserves memory for a region of which the first part has `cells` cells of the finest level.
   void reserve(size_t cells);
-  // Adds `count` cells of the finest level that have the same parent, of which `code` is the first
-  // possible one. All their surfaces have one flat color. `weight` is the sum of the surfaces'
-  // weights, and `stored` is the color_of() each cell. Requires that the constructor got no
-  // CellColor.
+  // Adds `count` cells of the finest level that have the same parent. `code` is the code of the
+  // parent's first child, whether or not this child is set. All surfaces in these cells have the
+  // color `color`, and `weight` is the sum of their weights. `stored` is the result of color_of()
+  // for each of the cells. Requires that the constructor got no CellColor.
   void add_siblings(uint32_t code, size_t count, const FlatColor& color, uint64_t weight,
                     Color stored);
   bool empty() const { return colors_.empty(); }

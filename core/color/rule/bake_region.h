@@ -109,7 +109,8 @@ class RegionBaker {
     }
     return has_all;
   }
-  // The three functions finish() return the result of the preceding calls, each for another use.
+  // Each finish() ends the region that begin() started. Call exactly one of them. This one sets
+  // `cells` as bake() does.
   void finish(std::vector<ColoredCell>& cells) { finish(cells, values_); }
   // Sets `cells` as bake() does. Sets `values` to an element for each cell if normals or materials
   // are wanted.
@@ -230,8 +231,8 @@ class RegionBaker {
     const color::CellTriangle<Int>& triangle_;
     const color::CoveredSurface<Int> covered_;
     std::optional<color::SurfaceLook<Textures>> look_;
-    std::optional<FlatColor> flat_;  // the color, if it is flat, and its index in RegionCells
-    uint32_t flat_index_ = 0;
+    std::optional<FlatColor> flat_;  // the color, if it is flat
+    uint32_t flat_index_ = 0;        // index_of() this color in RegionCells
     std::optional<color::SurfaceFacing> facing_;
     Cell batch_[kBatch];
     size_t collected_ = 0;

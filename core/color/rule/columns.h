@@ -30,18 +30,21 @@ struct ColumnTable {
   }
 };
 
-inline constexpr ColumnTable kColumnTable{};
+VOXDAG_HD inline const ColumnTable& column_table() {
+  static constexpr ColumnTable kTable{};
+  return kTable;
+}
 
 VOXDAG_HD inline uint32_t count_of(uint32_t columns) {
-  return uint32_t{kColumnTable.count[columns & 255]} + kColumnTable.count[columns >> 8];
+  return uint32_t{column_table().count[columns & 255]} + column_table().count[columns >> 8];
 }
 
 VOXDAG_HD inline ColumnTotals totals_of(uint32_t columns) {
-  constexpr const ColumnTable& kTable = kColumnTable;
+  const ColumnTable& table = column_table();
   const uint32_t low = columns & 255, high = columns >> 8;
-  const int64_t high_count = kTable.count[high];
-  return {kTable.count[low] + high_count, int64_t{kTable.sum_i[low]} + kTable.sum_i[high],
-          kTable.sum_j[low] + kTable.sum_j[high] + 2 * high_count};
+  const int64_t high_count = table.count[high];
+  return {table.count[low] + high_count, int64_t{table.sum_i[low]} + table.sum_i[high],
+          table.sum_j[low] + table.sum_j[high] + 2 * high_count};
 }
 
 // Returns the columns (i, j) for which first + a i + b j < 0. Sums that do not fit in Int wrap

@@ -27,9 +27,10 @@ namespace voxdag::color {
 class RegionCells {
  public:
   static constexpr uint32_t kMaxCells = 1u << (3 * kRegionLevels);
-  // Upper bound of the memory of all vectors while they grow, without AttributeSums.
+  // Upper bound of the memory of all vectors, without AttributeSums. reserve() prevents that they
+  // grow, which would need more.
   static constexpr uint64_t kMaxBytes =
-      uint64_t{kMaxCells} * (4 + 3 * (sizeof(uint64_t) + sizeof(ColorSum))) + (64 << 10);
+      uint64_t{kMaxCells} * (sizeof(uint32_t) + sizeof(uint64_t) + sizeof(ColorSum)) + (64 << 10);
 
   // `wanted`: the attributes to compute in addition to colors.
   explicit RegionCells(const AttributeSet& wanted = {})
@@ -44,7 +45,8 @@ class RegionCells {
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
   // Call prefetch() some time before touch() or cover(), so that these do not wait for memory.
   VOXDAG_PREFETCH void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
-  // Adds the cell if it is new, and returns the number of the cell, for the functions below.
+  // Adds the cell if it is new, and returns the number of the cell, for add(), sum() and
+  // attributes().
   uint32_t touch(uint32_t code) {
     uint32_t& place = places_[code];
     if (place == 0) {
@@ -89,7 +91,7 @@ class RegionCells {
     else
       color.add_to(sum(number), weight);
   }
-  // Returns the sum of a cell, to which a surface without a flat color is added.
+  // Returns the ColorSum of a cell, to which the caller can add any surface.
   ColorSum& sum(uint32_t number) {
     uint64_t& weight = weights_[number];
     if (!is_mixed(weight)) {
@@ -139,6 +141,7 @@ class RegionCells {
         is_flat &= (weight & kIndexMask) == index;
         total += weight >> kIndexBits;
       }
+      is_flat &= total < kMaxFlatWeight;
       if (waiting > 0 && (is_flat || waiting > std::size(others) - 8)) add_others();
       if (is_flat) {
         const auto& [color, stored] = flats_[index];
@@ -158,11 +161,14 @@ class RegionCells {
   static constexpr uint32_t kCovered = 1u << 31;
   // An element of weights_ consists of an index, in the lowest bits, and a number. If the index is
   // kMixed, the number is an index into sums_. Otherwise the index is an index into flats_, and the
-  // number is the sum of the weights, below 2^56.
+  // number is the sum of the weights, below 2^56. The element 0 stands for no surface.
   static constexpr int kIndexBits = 5;
   static constexpr uint64_t kIndexMask = (1 << kIndexBits) - 1;
   static constexpr uint32_t kMixed = kIndexMask;
   static constexpr size_t kMaxFlats = kMixed;
+  // Below this weight, no member of a ColorSum overflows. The color_of() a sum that has overflowed
+  // differs from the stored color in `flats_`.
+  static constexpr uint64_t kMaxFlatWeight = uint64_t{1} << 40;
 
   struct Flat {
     FlatColor color;
