@@ -16,6 +16,7 @@
 #include "query/package/gzip_block.h"
 #include "query/package/package_index.h"
 #include "query/package/write_package.h"
+#include "query/reorder/reorder.h"
 #include "scheduler/state/checkpoint/ingest_record.h"
 #include "tests/fuzz/scene/compressed_scenes.h"
 #include "tests/fuzz/scene/rich_scene.h"
@@ -38,6 +39,10 @@ class Corpus {
   void add(const std::string& target, const std::string& name, const std::string& bytes) const {
     std::filesystem::create_directories(root_ / target);
     write_bytes((root_ / target / name).string(), bytes);
+  }
+  // Returns the bytes of an input that was added.
+  std::string read(const std::string& target, const std::string& name) const {
+    return read_bytes((root_ / target / name).string());
   }
 
  private:
@@ -121,16 +126,56 @@ void add_artifacts(const Corpus& corpus) {
   }
 }
 
-// Adds an input of the target global_file: the first `header_bytes` bytes of the header page, then
-// all bytes between this page and the checksum table. The target restores the rest.
-void add_global_file(const Corpus& corpus, const char* name, const std::string& path,
-                     size_t header_bytes) {
+// Returns the input that stands for a global file (targets/global_bytes.h): the first
+// `header_bytes` bytes of the header page, then all bytes between this page and the checksum table.
+std::string global_input(const std::string& path, size_t header_bytes) {
   const std::string file = read_bytes(path);
   uint64_t table_at = 0;
   std::memcpy(&table_at, file.data() + global_layout::kTableOffsetAt, sizeof table_at);
   const size_t page = global_layout::kPageBytes;
-  corpus.add("global_file", name,
-             file.substr(0, header_bytes) + file.substr(page, table_at - page));
+  return file.substr(0, header_bytes) + file.substr(page, table_at - page);
+}
+
+// Adds a global file to the inputs of the targets that read one file. `reordered_file` also gets
+// its copy in the order by first parent.
+void add_global_file(const Corpus& corpus, const std::string& name, const std::string& path,
+                     size_t header_bytes) {
+  corpus.add("global_file", name, global_input(path, header_bytes));
+  corpus.add("reordered_file", name, global_input(path, header_bytes));
+  const auto file = open_global_file(path);
+  bool is_wide = false;
+  for (uint32_t l = 0; l <= file->brick_level(); ++l) is_wide |= file->level(l).pointer_bits == 64;
+  query::ReorderSpec spec;
+  spec.output = path + ".first_parent";
+  if (is_wide) spec.narrow_words = 2;
+  NoProgress progress;
+  query::reorder(*file, spec, system_files(), progress, CancelToken());
+  corpus.add("reordered_file", name + "_first_parent", global_input(spec.output, header_bytes));
+}
+
+// Adds pairs of inputs of the target global_file.
+void add_combined_files(const Corpus& corpus) {
+  struct Input {
+    const char* name;
+    std::string options;  // the operation and options, and three coordinates of the offset
+    const char *a, *b;
+  };
+  for (const auto& [name, options, a, b] :
+       {Input{"union", std::string("\x00\0\0\0", 4), "16", "colored_16"},
+        Input{"minus", std::string("\x45\3\0\xfe", 4), "16", "16"},
+        Input{"and", std::string("\x46\1\1\1", 4), "64", "16"},
+        Input{"xor", std::string("\x0f\xf0\3\2", 4), "16", "64"},
+        Input{"wide", std::string("\x44\0\1\0", 4), "wide_16", "wide_16"},
+        Input{"colors", std::string("\x0c\4\0\1", 4), "colored_16", "colored_16"},
+        Input{"moved_colors", std::string("\x4c\0\4\0", 4), "colored_16", "colored_64"},
+        Input{"fill_color", std::string("\x24\1\2\3", 4), "4", "colored_4"},
+        Input{"values", std::string("\x0c\1\0\0", 4), "valued_8", "valued_8"},
+        Input{"minus_colors", std::string("\x0d\1\1\0", 4), "colored_two_tiers", "valued_8"}}) {
+    const std::string first = corpus.read("global_file", a);
+    corpus.add("combined_files", name,
+               options + little_endian(static_cast<uint32_t>(first.size())) + first +
+                   corpus.read("global_file", b));
+  }
 }
 
 // Adds files without attributes. The header part of an input ends before the attribute table.
@@ -179,7 +224,7 @@ void add_colored_files(const Corpus& corpus) {
     write_valued(
         path, {levels, levels, random_codes(levels, levels, 30), smooth_colors(levels, 9)},
         levels == 3 ? AttributeSet::all() : AttributeSet::all().without(Attribute::kColor));
-    add_global_file(corpus, name.c_str(), path, global_layout::kFeaturesAt);
+    add_global_file(corpus, name, path, global_layout::kFeaturesAt);
   }
 }
 
@@ -339,6 +384,7 @@ int main(int argc, char** argv) {
   voxdag::test::add_artifacts(corpus);
   voxdag::test::add_global_files(corpus);
   voxdag::test::add_colored_files(corpus);
+  voxdag::test::add_combined_files(corpus);
   voxdag::test::add_packages(corpus);
   voxdag::test::add_records(corpus);
   voxdag::test::add_images(corpus);

@@ -1,104 +1,22 @@
-// Reads global files: opening, lookups, colors, rays, tiles and verification. An input has the
-// first bytes of the header page, and then the bytes of the levels and sections after this page.
-// The first bytes include the attribute table only if the header's number of attributes is not 0.
-// The target fills in the feature bits, the sizes, the checksum table and the checksums. Otherwise
-// the reader would refuse nearly every mutated input before it reaches other code.
-#include <sys/mman.h>
-#include <unistd.h>
-
+// Reads global files: opening, lookups, colors, rays, tiles and verification. global_bytes.h
+// describes the inputs.
 #include <algorithm>
-#include <cstring>
-#include <string>
-#include <vector>
 
 #include "core/base/error.h"
-#include "core/format/checksum.h"
 #include "core/format/global/checked_blocks.h"
-#include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/voxdag_reader.h"
-#include "core/format/verify/verify.h"
 #include "query/rays/ray_caster.h"
 #include "query/render/views.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
 #include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/targets/global_bytes.h"
 
 namespace voxdag {
 namespace {
 
-namespace layout = global_layout;
 constexpr uint64_t kMaxVisits = 4096;
-constexpr uint64_t kBudgetBytes = uint64_t{16} << 20;
-// The verifier requires that a level is wide (64-bit pointers) if and only if it has more words
-// than this. The limit is low, so that small files can have wide levels. For real files it is
-// kNarrowLevelWords.
-constexpr uint64_t kNarrowWords = 2;
-
-void put(std::vector<std::byte>& file, size_t at, uint64_t value) {
-  std::memcpy(file.data() + at, &value, sizeof value);
-}
-
-template <class T>
-T get(std::span<const std::byte> bytes, size_t at) {
-  T value{};
-  if (bytes.size() >= at + sizeof value) std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
-}
-
-// Returns feature bits that agree with the header of a file of version 2. A file without attributes
-// gets the bit of wide levels, because a file with neither would have version 1.
-uint64_t features_of(std::span<const std::byte> header, bool has_attributes) {
-  if (!has_attributes) return layout::kWideLevels;
-  for (size_t l = 0; l < layout::kMaxLevels; ++l)
-    if (get<uint32_t>(header, layout::kLevelsAt + l * layout::kLevelEntryBytes + 24) == 64)
-      return layout::kWideLevels | layout::kAttributes;
-  return layout::kAttributes;
-}
-
-std::vector<std::byte> make_file(std::span<const std::byte> input) {
-  const bool is_first_version = get<uint32_t>(input, layout::kVersionAt) == layout::kVersion;
-  const bool has_attributes =
-      !is_first_version && get<uint64_t>(input, layout::kAttributeCountAt) != 0;
-  const auto head = input.first(
-      std::min(input.size(), has_attributes ? layout::kFeaturesAt : layout::kAttributesAt));
-  const auto levels = input.subspan(head.size());
-  std::vector<std::byte> file(layout::kPageBytes + layout::round_up_to_page(levels.size()));
-  std::ranges::copy(head, file.begin());
-  std::ranges::copy(levels, file.begin() + layout::kPageBytes);
-  const size_t table_at = file.size();
-  std::vector<uint64_t> table;
-  for (size_t at = layout::kPageBytes; at < table_at; at += layout::kChecksumBlockBytes)
-    table.push_back(checksum64(
-        std::span(file).subspan(at, std::min<size_t>(layout::kChecksumBlockBytes, table_at - at))));
-  const auto table_bytes = std::as_bytes(std::span(table));
-  file.insert(file.end(), table_bytes.begin(), table_bytes.end());
-  put(file, layout::kFeaturesAt, is_first_version ? 0 : features_of(file, has_attributes));
-  put(file, layout::kFileBytesAt, file.size());
-  put(file, layout::kTableOffsetAt, table_at);
-  put(file, layout::kTableCountAt, table.size());
-  put(file, layout::kTableChecksumAt, checksum64(table_bytes));
-  put(file, layout::kHeaderChecksumAt,
-      checksum64(std::span(file).first(layout::kHeaderChecksumAt)));
-  return file;
-}
-
-// A temporary file in memory, for a reader that opens a path. The file is in no folder; its path is
-// its descriptor in /proc.
-class NamelessFile {
- public:
-  explicit NamelessFile(std::span<const std::byte> bytes) : fd_(memfd_create("fuzz", MFD_CLOEXEC)) {
-    fuzz::require(
-        fd_ >= 0 && ::write(fd_, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
-        "a file can be made in memory");
-  }
-  NamelessFile(const NamelessFile&) = delete;
-  ~NamelessFile() { ::close(fd_); }
-  std::string path() const { return "/proc/self/fd/" + std::to_string(fd_); }
-
- private:
-  const int fd_;
-};
 
 // Visits at most kMaxVisits nodes of the octree, and reads the color and the other attributes of
 // each visited cube.
@@ -201,25 +119,11 @@ void answer_strangers(const voxdag_reader::File& file) {
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxdag;
-  const NamelessFile bytes(make_file(fuzz::bytes_of(data, size)));
+  const fuzz::NamelessFile bytes(fuzz::make_file(fuzz::bytes_of(data, size)));
   try {
     const voxdag_reader::File file(bytes.path());
     fuzz::require(file.first_damaged_block() == 0, "checksums that fit are found to fit");
-    MemoryBudget budget(kBudgetBytes);
-    NoProgress progress;
-    bool is_sound = true;
-    try {
-      bool is_wide = false;
-      for (uint32_t l = 0; l <= file.brick_level(); ++l)
-        is_wide |= file.level(l).pointer_bits == 64;
-      const uint64_t narrow_words =
-          is_wide || (file.version() != layout::kVersion && !attributes_of(file).any())
-              ? kNarrowWords
-              : layout::kNarrowLevelWords;
-      verify_global_file(file, 1, budget, progress, CancelToken(), narrow_words);
-    } catch (const Error&) {
-      is_sound = false;
-    }
+    const bool is_sound = fuzz::is_sound(file);
     try {
       read_all(file);
       cast_rays(file);

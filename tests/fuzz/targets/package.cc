@@ -10,8 +10,6 @@
 // package.json, the plain page of the directory, and the plain blocks. The target compresses page
 // and blocks, and corrects names, sizes and offsets, so that a mutation reaches the code after
 // these checks.
-#include <stdlib.h>
-
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -25,6 +23,7 @@
 #include "query/package/package_reader.h"
 #include "query/package/tile_block.h"
 #include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/targets/memory_folder.h"
 
 namespace voxdag {
 namespace {
@@ -59,21 +58,8 @@ void read_colors(std::string_view bytes) {
                 "a block of color pages is encoded to the same bytes");
 }
 
-// A folder in memory, if the system has one. It has the files of the package of the current input.
-const std::string& folder() {
-  static const std::string path = [] {
-    std::string name = std::filesystem::is_directory("/dev/shm") ? "/dev/shm" : "/tmp";
-    name += "/voxdag-fuzz-XXXXXX";
-    fuzz::require(mkdtemp(name.data()) != nullptr, "a folder can be made");
-    static std::string made = name;
-    std::atexit([] { std::filesystem::remove_all(made); });
-    return name;
-  }();
-  return path;
-}
-
 void write(const std::string& name, const std::string& contents) {
-  std::ofstream(folder() + "/" + name, std::ios::binary) << contents;
+  std::ofstream(fuzz::memory_folder() + "/" + name, std::ios::binary) << contents;
 }
 
 // Takes the next section of a complete package; "" after the last.
@@ -113,7 +99,7 @@ std::string make_directory(query::PackageIndex& index, const std::string& page) 
 
 // Reads a tile or a color page of each band, and then checks the package. Errors are allowed.
 void read_folder() {
-  const query::PackageReader package(system_files(), folder());
+  const query::PackageReader package(system_files(), fuzz::memory_folder());
   for (const query::PackageBand& band : package.index().bands) try {
       if (band.is_color)
         package.color_page(band.level, {0, 0, 0});
@@ -141,8 +127,8 @@ void read_package(std::string_view sections) {
     read_folder();
   } catch (const Error&) {
   }
-  std::filesystem::remove(folder() + "/" + index.directory.name);
-  std::filesystem::remove(folder() + "/" + pack_name);
+  std::filesystem::remove(fuzz::memory_folder() + "/" + index.directory.name);
+  std::filesystem::remove(fuzz::memory_folder() + "/" + pack_name);
 }
 
 void read(int decoder, std::string_view bytes) {
