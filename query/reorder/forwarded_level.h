@@ -48,7 +48,7 @@ class ForwardedLevel {
   // offsets must be less than 2^48; levels have at most 2^40 words.
   template <class Place>
   uint64_t find(uint64_t offset, const Place& place) {
-    if (offset + 1 >= words_.size()) no_node(offset);
+    if (words_.size() < 2 || offset > words_.size() - 2) no_node(offset);
     uint32_t* const node = words_.data() + offset;
     if (is_brick_level_) return find_brick(offset, node, place);
     if ((node[0] & kLowBits) == kPlaced)
