@@ -126,7 +126,7 @@ void add_artifacts(const Corpus& corpus) {
   }
 }
 
-// Returns the input that stands for a global file (targets/global_bytes.h): the first
+// Returns the input that stands for a global file (support/global_bytes.h): the first
 // `header_bytes` bytes of the header page, then all bytes between this page and the checksum table.
 std::string global_input(const std::string& path, size_t header_bytes) {
   const std::string file = read_bytes(path);
@@ -136,12 +136,11 @@ std::string global_input(const std::string& path, size_t header_bytes) {
   return file.substr(0, header_bytes) + file.substr(page, table_at - page);
 }
 
-// Adds a global file to the inputs of the targets that read one file. `reordered_file` also gets
-// its copy in the order by first parent.
+// Adds a global file to the inputs of global_file, and its copy in the order by first parent to the
+// inputs of reordered_file.
 void add_global_file(const Corpus& corpus, const std::string& name, const std::string& path,
                      size_t header_bytes) {
   corpus.add("global_file", name, global_input(path, header_bytes));
-  corpus.add("reordered_file", name, global_input(path, header_bytes));
   const auto file = open_global_file(path);
   bool is_wide = false;
   for (uint32_t l = 0; l <= file->brick_level(); ++l) is_wide |= file->level(l).pointer_bits == 64;
@@ -150,7 +149,7 @@ void add_global_file(const Corpus& corpus, const std::string& name, const std::s
   if (is_wide) spec.narrow_words = 2;
   NoProgress progress;
   query::reorder(*file, spec, system_files(), progress, CancelToken());
-  corpus.add("reordered_file", name + "_first_parent", global_input(spec.output, header_bytes));
+  corpus.add("reordered_file", name, global_input(spec.output, header_bytes));
 }
 
 // Adds pairs of inputs of the target global_file.

@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/format/checksum.h"
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxdag;

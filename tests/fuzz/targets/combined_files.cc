@@ -8,9 +8,9 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "query/combine/combine.h"
-#include "tests/fuzz/targets/fuzz_target.h"
-#include "tests/fuzz/targets/global_bytes.h"
-#include "tests/fuzz/targets/memory_folder.h"
+#include "tests/fuzz/support/fuzz_target.h"
+#include "tests/fuzz/support/global_bytes.h"
+#include "tests/fuzz/support/memory_folder.h"
 
 namespace voxdag {
 namespace {

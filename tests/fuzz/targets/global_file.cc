@@ -10,8 +10,8 @@
 #include "query/render/views.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
-#include "tests/fuzz/targets/fuzz_target.h"
-#include "tests/fuzz/targets/global_bytes.h"
+#include "tests/fuzz/support/fuzz_target.h"
+#include "tests/fuzz/support/global_bytes.h"
 
 namespace voxdag {
 namespace {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "server/http/http_server.h"
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 namespace voxdag::server {
 namespace {

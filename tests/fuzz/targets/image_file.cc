@@ -10,7 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/image/image_reader.h"
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 namespace voxdag {
 namespace {

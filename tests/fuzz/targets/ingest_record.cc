@@ -3,7 +3,7 @@
 #include "scheduler/state/checkpoint/ingest_record.h"
 
 #include "core/base/error.h"
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace voxdag;

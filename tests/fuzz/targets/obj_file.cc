@@ -1,6 +1,6 @@
 // Reads OBJ files and their material libraries. The target uses every input twice: as the
 // statements of an OBJ file after a few valid statements, and as the library of this file.
-#include "tests/fuzz/targets/scene_triangles.h"
+#include "tests/fuzz/support/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);

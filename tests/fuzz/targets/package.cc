@@ -22,8 +22,8 @@
 #include "query/package/gzip_block.h"
 #include "query/package/package_reader.h"
 #include "query/package/tile_block.h"
-#include "tests/fuzz/targets/fuzz_target.h"
-#include "tests/fuzz/targets/memory_folder.h"
+#include "tests/fuzz/support/fuzz_target.h"
+#include "tests/fuzz/support/memory_folder.h"
 
 namespace voxdag {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 int main(int argc, char** argv) {
   namespace fs = std::filesystem;

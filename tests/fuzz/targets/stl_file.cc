@@ -3,7 +3,7 @@
 // facets are corrected to agree, or a file without changes.
 #include <algorithm>
 
-#include "tests/fuzz/targets/scene_triangles.h"
+#include "tests/fuzz/support/scene_triangles.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   if (size == 0) return 0;

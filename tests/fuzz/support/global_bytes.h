@@ -18,7 +18,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/format/verify/verify.h"
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 namespace voxdag::fuzz {
 

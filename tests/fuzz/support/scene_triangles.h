@@ -5,7 +5,7 @@
 
 #include "scene/formats/formats.h"
 #include "scene/triangle_source.h"
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 #include "tests/support/memory_files.h"
 
 namespace voxdag::fuzz {

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "tests/fuzz/targets/fuzz_target.h"
+#include "tests/fuzz/support/fuzz_target.h"
 
 namespace voxdag::fuzz {
 
