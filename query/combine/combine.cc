@@ -22,6 +22,7 @@
 #include "query/combine/moved.h"
 #include "query/combine/pair_levels.h"
 #include "query/dag/locked_outputs.h"
+#include "query/dag/publish_file.h"
 #include "query/dag/refuse_order.h"
 #include "query/dag/temporary_work.h"
 
@@ -226,12 +227,8 @@ class Combination {
       report.bytes = out.finish_temporary(counts);
       return;
     }
-    progress_.begin_stage("write", 1, "files");
-    const GlobalFileSummary summary = out.seal(counts, work_.spec.threads, cancel_);
-    before_publish();
-    out.publish();
-    progress_.advance(1);
-    progress_.end_stage();
+    const GlobalFileSummary summary =
+        publish_file(out, counts, work_.spec.threads, before_publish, progress_, cancel_);
     report.bytes = summary.bytes;
     report.sha256 = summary.sha256;
   }

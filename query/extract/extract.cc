@@ -23,6 +23,7 @@
 #include "core/geometry/octree_descent.h"
 #include "merge/merge.h"
 #include "query/dag/locked_outputs.h"
+#include "query/dag/publish_file.h"
 #include "query/dag/refuse_attributes.h"
 #include "query/dag/temporary_work.h"
 #include "query/extract/majority_cells.h"
@@ -94,13 +95,9 @@ class Extraction {
           write_part_attribute({file_, spec_.selection, crop_}, attribute, files_, out, budget_,
                                spec_.threads, progress_, cancel_);
       });
-    progress_.begin_stage("write", 1, "files");
     const GlobalFileSummary summary =
-        out.seal({.voxels = merged.voxels, .svo_nodes = merged.svo_nodes}, spec_.threads, cancel_);
-    before_publish();
-    out.publish();
-    progress_.advance(1);
-    progress_.end_stage();
+        publish_file(out, {.voxels = merged.voxels, .svo_nodes = merged.svo_nodes}, spec_.threads,
+                     before_publish, progress_, cancel_);
     report_.bytes = summary.bytes;
     report_.sha256 = summary.sha256;
     return report_;

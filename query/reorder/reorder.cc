@@ -10,6 +10,7 @@
 #include "core/format/global/watched_file.h"
 #include "query/combine/dag_input.h"
 #include "query/dag/locked_outputs.h"
+#include "query/dag/publish_file.h"
 #include "query/dag/temporary_work.h"
 #include "query/reorder/order_levels.h"
 
@@ -61,13 +62,9 @@ ReorderReport reorder(const voxdag_reader::File& file, const ReorderSpec& spec, 
                  progress, cancel);
     DagInput input(file, spec.memory_bytes, cancel);
     copy_sections(file, input, out);
-    progress.begin_stage("write", 1, "files");
-    const GlobalFileSummary summary =
-        out.seal({file.voxels(), file.svo_nodes()}, spec.threads, cancel);
-    watched.check_readable();
-    out.publish();
-    progress.advance(1);
-    progress.end_stage();
+    const GlobalFileSummary summary = publish_file(
+        out, {file.voxels(), file.svo_nodes()}, spec.threads, [&] { watched.check_readable(); },
+        progress, cancel);
     return {summary.bytes, summary.sha256, scratch.bytes_written()};
   };
   return watched.run([&] { return with_reader_errors(run); });

@@ -238,7 +238,7 @@ TEST_F(UnusualInput, PlanNeedsNoTmpdir) {
 }
 
 // A command whose standard output cannot be written fails, and its error names the standard output.
-// The reason is known for outputs that the program writes in several pieces (build --help), too.
+// The reason is also known for outputs that the program writes in several pieces (build --help).
 TEST_F(UnusualInput, OutputThatCannotBeWrittenIsAnError) {
   build();
   for (const char* command : {"info m.vdag --json", "--version", "verify m.vdag",

@@ -105,7 +105,7 @@ VOXDAG_SLICES_INLINE void add_free(Words& reached, const Words& free, const Word
   reached.low |= free.low & moved.low;
   reached.high |= free.high & moved.high;
 }
-// Keeps the voxels of `free` that are in `moved`, too.
+// Removes from `free` the voxels that are not in `moved`.
 VOXDAG_SLICES_INLINE void keep_common(Words& free, const Words& moved) {
   free.low &= moved.low;
   free.high &= moved.high;

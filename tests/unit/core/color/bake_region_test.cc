@@ -160,8 +160,8 @@ void make_flat(std::vector<FixedSurface>& surfaces, int colors) {
         corner.color = palette[static_cast<size_t>(&surface - surfaces.data()) % palette.size()];
 }
 
-// The sums of cells whose surfaces all have one flat color are computed in another way than other
-// sums. A white image does not change a color, but the surface no longer counts as flat.
+// If all surfaces of a cell have one flat color, the cell's sum is computed from a weight. A white
+// image does not change a color, but the surface no longer counts as flat.
 TEST(BakeRegion, FlatColorsAddUpLikeImages) {
   TestLooks flat, white;
   white.images.add_white();
@@ -212,7 +212,7 @@ TEST(BakeRegion, EncodesWhatItsSumsGive) {
       }
 }
 
-// Collects what RegionCells gives to its encoder.
+// An encoder that collects the colors of RegionCells.
 struct CollectedColors {
   std::map<uint32_t, Color> colors;  // only of cells that were not added as siblings
   size_t siblings = 0;
