@@ -19,10 +19,10 @@ COPY tools/packages tools/packages
 RUN tools/packages build
 COPY . .
 RUN cmake --preset quick \
-    && cmake --build --preset quick --target voxdag \
-    && install -D --strip build/quick/voxdag /out/voxdag \
-    && ldd /out/voxdag | awk '/=> \//{print $3}' | xargs -n 1 basename | sed 's|^|*/|' \
-      | xargs dpkg-query -S | cut -d : -f 1 | sort -u > /out/packages
+    && cmake --build --preset quick --target voxdag manual \
+    && cmake --install build/quick --component program --strip --prefix /out/local \
+    && ldd /out/local/bin/voxdag /out/local/lib/voxdag/*.so | awk '/=> \//{print $3}' \
+      | xargs -n 1 basename | sort -u | sed 's|^|*/|' | xargs dpkg-query -S | cut -d : -f 1 | sort -u > /out/packages
 
 FROM ${RUN_BASE}
 ARG VERSION=0.1.0
@@ -40,7 +40,7 @@ RUN apt-get update \
     && useradd --create-home --uid 10001 voxdag \
     && install -d -m 1777 /data
 COPY --from=build /src/LICENSE /usr/share/doc/voxdag/LICENSE
-COPY --from=build /out/voxdag /usr/local/bin/voxdag
+COPY --from=build /out/local /usr/local
 USER 10001
 WORKDIR /data
 EXPOSE 8080

@@ -3,8 +3,8 @@
 
     packaging/release/make_sbom.py VERSION OUTPUT NAME=BINARY=BUILD...
 
-NAME is a part of the release, such as wheel. BINARY is its program or library, and BUILD is the
-folder in which it was built. Each library is listed once, with its Debian version and licenses, and
+NAME is a part of the release, such as wheel. BINARY is one of its programs or libraries, and BUILD
+is the folder in which it was built. Each library is listed once, with its Debian version and licenses, and
 with the parts that use it: "linked", or "compiled" for headers.
 """
 
@@ -58,7 +58,9 @@ def bill(version, parts):
         for library in libraries.libraries(binary, build):
             found[library["package"]] = library
             use = "linked" if library["is_linked"] else "compiled"
-            uses.setdefault(library["package"], {})[name] = use
+            # A part can consist of several binaries.
+            if uses.setdefault(library["package"], {}).get(name) != "linked":
+                uses[library["package"]][name] = use
     components = [component(found[package], uses[package]) for package in sorted(found)]
     revision, time = commit()
     product = f"pkg:generic/voxdag@{version}"

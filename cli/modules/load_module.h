@@ -1,0 +1,20 @@
+// Loads modules (modules.h) and checks them. Thread-safe.
+#pragma once
+
+#include <string>
+
+#include "cli/modules/modules.h"
+
+namespace voxdag::cli {
+
+// Loads the library "voxdag-<name>.so" from the folder of modules. Returns the address of its table
+// "voxdag_<name>_module", which begins with a ModuleHead. The library remains loaded. Throws Error{kIo} if the library cannot be loaded, or if it belongs to another
+// version of voxdag.
+const void* load_module(const std::string& name);
+
+template <class Table>
+const Table& module_table(const char* name) {
+  return *static_cast<const Table*>(load_module(name));
+}
+
+}  // namespace voxdag::cli
