@@ -4,8 +4,8 @@
     packaging/release/make_sbom.py VERSION OUTPUT NAME=BINARY=BUILD...
 
 NAME is a part of the release, such as wheel. BINARY is one of its programs or libraries, and BUILD
-is the folder in which it was built. Each library is listed once, with its Debian version and licenses, and
-with the parts that use it: "linked", or "compiled" for headers.
+is the folder in which it was built. Each library is listed once, with its Debian version and
+licenses, and with the parts that use it: "linked", or "compiled" for headers.
 """
 
 import json
