@@ -48,8 +48,8 @@ TEST_F(Modules, AMissingModuleIsNamed) {
   const std::string in_folder = "cd '" + folder_.path() + "' && ";
   EXPECT_EQ(output_of(in_folder + "./voxdag --version"), run({"--version"}).out);
 #ifdef VOXDAG_HAS_VDB
-  const std::string error =
-      output_of(in_folder + "./voxdag export m.vdag --to nvdb -o m.nvdb --quiet 2>&1 || test $? = 6");
+  const std::string error = output_of(
+      in_folder + "./voxdag export m.vdag --to nvdb -o m.nvdb --quiet 2>&1 || test $? = 6");
   for (const char* part : {"cannot load a part of voxdag", "voxdag-vdb.so", "same installation"})
     EXPECT_NE(error.find(part), std::string::npos) << error;
   EXPECT_FALSE(exists("m.nvdb"));
