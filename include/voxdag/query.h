@@ -137,6 +137,11 @@ class DagFile {
   // ray, such as the ray of a neighboring pixel.
   void rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
             const RayLimits& limits, std::span<RayHit> hits, unsigned threads = 1) const;
+  // Sets occluded[i] to 1 if a set cell is on ray i within the limits, so if rays() would find a
+  // hit; else to 0. Arguments are the same as for rays(). Faster than rays(), for example for
+  // shadows and lines of sight.
+  void occluded(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
+                const RayLimits& limits, std::span<uint8_t> occluded, unsigned threads = 1) const;
 
   // Writes the region as a dense array, with 1 for each set cell and 0 for all others. Cell p is at
   // index ((p.x - low.x) * ny + p.y - low.y) * nz + p.z - low.z, where ny and nz are the region's

@@ -94,6 +94,16 @@ void rays(const query::DagFile& dag, const Rows<const double>& origins,
   }
 }
 
+void occluded(const query::DagFile& dag, const Rows<const double>& origins,
+              const Rows<const double>& directions, double max_distance, double stop_size,
+              const Column<uint8_t>& occluded, unsigned threads) {
+  expect_length("directions", directions.shape(0), origins.shape(0));
+  expect_length("occluded", occluded.shape(0), origins.shape(0));
+  const nb::gil_scoped_release released;
+  dag.occluded(coordinates_of(origins), coordinates_of(directions), {max_distance, stop_size},
+               {occluded.data(), occluded.shape(0)}, threads_of(threads));
+}
+
 void dense(const query::DagFile& dag, const Position& low, const Position& high,
            uint32_t grid_levels, const Cells<uint8_t>& cells) {
   for (size_t axis = 0; axis < 3; ++axis)
@@ -237,6 +247,7 @@ void bind_dag(nb::module_& module) {
       .def("world_to_region", &world_to_region)
       .def("lookup", &lookup)
       .def("rays", &rays)
+      .def("occluded", &occluded)
       .def("dense", &dense)
       .def("points", &points)
       .def("point_count", &point_count)

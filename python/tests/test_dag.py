@@ -97,12 +97,19 @@ def test_rays_along_an_axis(dag, cells):
         assert tuple(hits.normal[i]) == (-1, 0, 0)
     near = dag.rays(origins, [[2.0, 0, 0]], max_distance=25.5)
     assert np.array_equal(near.hit, hits.distance <= 25.5)
+    occluded = dag.occluded(origins, [[2.0, 0, 0]], threads=2)
+    assert occluded.dtype == bool and np.array_equal(occluded, hits.hit)
+    assert np.array_equal(dag.occluded(origins, [2.0, 0, 0], max_distance=25.5), near.hit)
 
 
 def test_rays_in_the_scene(dag):
     hits = dag.rays([[0, -100, 0]], [[0, 1, 0]], world=True)
     assert hits.distance[0] == pytest.approx(100 - 4.25, abs=dag.voxel_size)
     assert tuple(hits.normal[0]) == (0, -1, 0)
+    distance = hits.distance[0]
+    for limit in (0.99 * distance, 1.01 * distance):
+        occluded = dag.occluded([[0, -100, 0]], [[0, 1, 0]], limit, world=True)
+        assert occluded.tolist() == [limit > distance]
 
 
 def test_a_ray_from_inside(dag, cells):
@@ -131,6 +138,7 @@ def test_nearest_at_the_distance_that_it_returns(dag):
 
 def test_no_rays(dag):
     assert len(dag.rays([[0, 0, 0]], np.empty((0, 3))).distance) == 0
+    assert dag.occluded([[0, 0, 0]], np.empty((0, 3))).shape == (0,)
 
 
 def test_threads(dag, cells):
@@ -159,6 +167,8 @@ def test_threads(dag, cells):
         (lambda dag: dag.lookup([[np.nan, 0, 0]], world=True), "invalid_input"),
         (lambda dag: dag.rays([[0, 0, 0]], [[0, 0, 0]]), "invalid_input"),
         (lambda dag: dag.rays([[0, 0, 0]], [[np.nan, 0, 1]]), "invalid_input"),
+        (lambda dag: dag.occluded([[0, 0, 0]], [[0, 0, 0]]), "invalid_input"),
+        (lambda dag: dag.occluded([[0, 0, 0]], [[1, 0, 0]], -1), "invalid_input"),
         (lambda dag: dag.rays([[0, 0, 0]] * 2, [[1, 0, 0]] * 3), "invalid_input"),
         (lambda dag: dag.count(level=7), "invalid_input"),
         (lambda dag: dag.count((0, 0, 0, 1)), "invalid_input"),

@@ -140,6 +140,7 @@ def test_threads(path, dag, tmp_path):
         lambda n: dag.lookup([[1, 2, 3]], threads=n),
         lambda n: dag.nearest([[1, 2, 3]], threads=n),
         lambda n: dag.rays([[1, 2, 3]], [[1, 0, 0]], threads=n),
+        lambda n: dag.occluded([[1, 2, 3]], [[1, 0, 0]], threads=n),
     ]
     for call in calls:
         for threads in (-1, 1 << 40):

@@ -158,6 +158,21 @@ void for_each_batch(size_t count, const Work& work) {
     work(first, std::min(count - first, kBatch));
 }
 
+// Divides rays into batches. Calls cast(first, origins, directions) for each of them, with the
+// index of its first ray.
+template <class Cast>
+void for_each_ray_batch(const voxdag_ray* rays, size_t count, const Cast& cast) {
+  std::vector<voxdag::query::Coordinates> origins(std::min(count, kBatch)), directions(origins);
+  for_each_batch(count, [&](size_t first, size_t some) {
+    for (size_t i = 0; i < some; ++i) {
+      std::copy_n(rays[first + i].origin, 3, origins[i].begin());
+      std::copy_n(rays[first + i].direction, 3, directions[i].begin());
+    }
+    cast(first, std::span<const voxdag::query::Coordinates>(origins).first(some),
+         std::span<const voxdag::query::Coordinates>(directions).first(some));
+  });
+}
+
 void copy_hit(const voxdag::query::RayHit& from, uint32_t grid_levels, voxdag_hit& to) {
   to = {HUGE_VAL, {-1, -1, -1}, {}, {}};
   if (!from.hit) return;
@@ -281,17 +296,25 @@ voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_ray* rays, 
     if (count) expect_pointer(rays, "the array of rays");
     if (count) expect_pointer(hits, "the array of hits");
     const voxdag::query::RayLimits known = ray_limits_of(limits);
-    std::vector<voxdag::query::Coordinates> origins(std::min(count, kBatch)), directions(origins);
-    std::vector<voxdag::query::RayHit> found(origins.size());
-    for_each_batch(count, [&](size_t first, size_t some) {
-      for (size_t i = 0; i < some; ++i) {
-        std::copy_n(rays[first + i].origin, 3, origins[i].begin());
-        std::copy_n(rays[first + i].direction, 3, directions[i].begin());
-      }
-      file->dag.rays(std::span(origins).first(some), std::span(directions).first(some), known,
-                     std::span(found).first(some));
-      for (size_t i = 0; i < some; ++i)
-        copy_hit(found[i], file->dag.grid_levels(), hits[first + i]);
+    std::vector<voxdag::query::RayHit> found(std::min(count, kBatch));
+    for_each_ray_batch(rays, count, [&](size_t first, const auto& origins, const auto& directions) {
+      const auto hit = std::span(found).first(origins.size());
+      file->dag.rays(origins, directions, known, hit);
+      for (size_t i = 0; i < hit.size(); ++i)
+        copy_hit(hit[i], file->dag.grid_levels(), hits[first + i]);
+    });
+  });
+}
+
+voxdag_status voxdag_occluded(const voxdag_file* file, const voxdag_ray* rays, size_t count,
+                              const voxdag_ray_limits* limits, uint8_t* occluded) {
+  return answer([&] {
+    expect_pointer(file, "the file");
+    if (count) expect_pointer(rays, "the array of rays");
+    if (count) expect_pointer(occluded, "the array of answers");
+    const voxdag::query::RayLimits known = ray_limits_of(limits);
+    for_each_ray_batch(rays, count, [&](size_t first, const auto& origins, const auto& directions) {
+      file->dag.occluded(origins, directions, known, {occluded + first, origins.size()});
     });
   });
 }

@@ -166,6 +166,12 @@ VOXDAG_API voxdag_status voxdag_cast_rays(const voxdag_file* file, const voxdag_
                                           size_t count, const voxdag_ray_limits* limits,
                                           voxdag_hit* hits);
 
+/* Sets occluded[i] to 1 if a set cell is on ray i within the limits, so if voxdag_cast_rays() would
+ * find a hit; else to 0. Faster than voxdag_cast_rays(). */
+VOXDAG_API voxdag_status voxdag_occluded(const voxdag_file* file, const voxdag_ray* rays,
+                                         size_t count, const voxdag_ray_limits* limits,
+                                         uint8_t* occluded);
+
 /* Counts the set cells in a region. */
 VOXDAG_API voxdag_status voxdag_count(const voxdag_file* file, uint32_t grid_levels,
                                       const voxdag_region* region, uint64_t* count);

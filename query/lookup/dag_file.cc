@@ -113,6 +113,33 @@ RayHit as_ray_hit(const Hit& hit, const Ray& ray) {
   return out;
 }
 
+// Throws Error{kInvalidInput} unless the arrays of a ray query have equal lengths and the limits
+// are valid.
+void check_rays(size_t origins, size_t directions, const RayLimits& limits, size_t results) {
+  require_length("directions", directions, origins, "origins");
+  require_length("results", results, origins, "origins");
+  require_not_negative("max_distance", limits.max_distance);
+  require_not_negative("stop_size", limits.stop_size);
+}
+
+// Divides the rays into packets. Calls cast(first, rays, packet) for each of them, on one of
+// `threads` threads, with the index of its first ray.
+template <class Cast>
+void for_each_packet(const DagView& dag, std::span<const Coordinates> origins,
+                     std::span<const Coordinates> directions, const RayLimits& limits,
+                     unsigned threads, const Cast& cast) {
+  for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
+    constexpr size_t kRays = RayPacket::kRays;
+    RayPacket packet(dag, limits.stop_size, 0, limits.max_distance);
+    Ray rays[kRays];
+    for (size_t first = batch; first < batch + count; first += kRays) {
+      const size_t n = std::min(kRays, batch + count - first);
+      make_rays(origins.subspan(first, n), directions.subspan(first, n), first, rays);
+      cast(first, std::span<const Ray>(rays, n), packet);
+    }
+  });
+}
+
 // Returns the largest integer whose square root, as a double, is at most `distance`. For a distance
 // of 2^31 or more, returns 2^62: coordinates are at most kMaxCoordinate, so no squared distance is
 // larger.
@@ -318,26 +345,29 @@ void DagFile::materials(std::span<const Position> points, uint32_t grid_levels,
 
 void DagFile::rays(std::span<const Coordinates> origins, std::span<const Coordinates> directions,
                    const RayLimits& limits, std::span<RayHit> hits, unsigned threads) const {
-  require_length("directions", directions.size(), origins.size(), "origins");
-  require_length("results", hits.size(), origins.size(), "origins");
-  require_not_negative("max_distance", limits.max_distance);
-  require_not_negative("stop_size", limits.stop_size);
+  check_rays(origins.size(), directions.size(), limits, hits.size());
   state_->prepare_for_queries(origins.size());
-  naming_file(file().path(), [&] {
-    for_each_batch(threads, origins.size(), [&](size_t batch, size_t count) {
-      constexpr size_t kRays = RayPacket::kRays;
-      RayPacket packet(state_->view, limits.stop_size, 0, limits.max_distance);
-      Ray rays[kRays];
-      Hit found[kRays];
-      for (size_t first = batch; first < batch + count; first += kRays) {
-        const size_t n = std::min(kRays, batch + count - first);
-        make_rays(origins.subspan(first, n), directions.subspan(first, n), first, rays);
-        const uint64_t have_hit = packet.cast({rays, n}, found);
-        for (size_t i = 0; i < n; ++i)
-          hits[first + i] = have_hit >> i & 1 ? as_ray_hit(found[i], rays[i]) : RayHit{};
-      }
-    });
-  });
+  const auto record = [&](size_t first, std::span<const Ray> rays, RayPacket& packet) {
+    Hit found[RayPacket::kRays];
+    const uint64_t have_hit = packet.cast(rays, found);
+    for (size_t i = 0; i < rays.size(); ++i)
+      hits[first + i] = have_hit >> i & 1 ? as_ray_hit(found[i], rays[i]) : RayHit{};
+  };
+  naming_file(file().path(),
+              [&] { for_each_packet(state_->view, origins, directions, limits, threads, record); });
+}
+
+void DagFile::occluded(std::span<const Coordinates> origins,
+                       std::span<const Coordinates> directions, const RayLimits& limits,
+                       std::span<uint8_t> occluded, unsigned threads) const {
+  check_rays(origins.size(), directions.size(), limits, occluded.size());
+  state_->prepare_for_queries(origins.size());
+  const auto record = [&](size_t first, std::span<const Ray> rays, RayPacket& packet) {
+    const uint64_t have_hit = packet.occluded(rays);
+    for (size_t i = 0; i < rays.size(); ++i) occluded[first + i] = have_hit >> i & 1;
+  };
+  naming_file(file().path(),
+              [&] { for_each_packet(state_->view, origins, directions, limits, threads, record); });
 }
 
 void DagFile::bricks(const Selection& selection,

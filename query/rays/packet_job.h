@@ -69,8 +69,10 @@ struct PacketJob {
   double t_min = 0, t_max = 0;
   alignas(64) double origin[3][kPacketRays], inverse[3][kPacketRays];
   PacketRay rays[kPacketRays];
+  // hits[ray] is the first cell that a ray of `found` hits. If `hits` is null, the walk only finds
+  // out which rays have a hit.
   Hit* hits = nullptr;
-  uint64_t found = 0;   // bits of the rays with a hit; hits[ray] is the first cell hit
+  uint64_t found = 0;   // bits of the rays with a hit
   uint64_t single = 0;  // bits of the rays that RayCaster must cast
 
   // Rays that descend separately are collected and then advanced together in a round. A round

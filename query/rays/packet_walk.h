@@ -405,8 +405,12 @@ class PacketWalk {
   }
 
   // Reports this cell as the ray's hit. If the ray enters the cell through two faces at the same
-  // parameter, gives the ray up instead. Returns true.
+  // parameter, gives the ray up instead, unless the caller needs no hits. Returns true.
   VOXDAG_INLINE bool report(Int4 low, int32_t edge, int ray, uint32_t depth) {
+    if (!job_.hits) {
+      job_.found |= uint64_t{1} << ray;
+      return true;
+    }
     const PacketRay& r = job_.rays[ray];
     double t = job_.t_min;
     int entered_by = -1;

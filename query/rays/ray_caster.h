@@ -46,6 +46,12 @@ class RayCaster {
   // ended early, and a result of false does not mean that there is no hit.
   bool cast(const Ray& ray, const Cone& cone, double t_min, double t_max, Hit& hit,
             uint64_t& steps_left) const;
+  // True if an occupied cell exists between t_min and t_max, so if cast() would find a hit. Throws
+  // Error{kCorrupt} for a damaged DAG.
+  bool occluded(const Ray& ray, const Cone& cone, double t_min, double t_max) const {
+    Hit unused;
+    return cast(ray, cone, t_min, t_max, unused);
+  }
 
  private:
   const DagView& dag_;

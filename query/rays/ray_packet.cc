@@ -46,8 +46,9 @@ uint64_t RayPacket::cast(std::span<const Ray> rays, Hit* hits) {
   const RayCaster caster(dag_);
   for (uint64_t left = job_.single; left != 0; left &= left - 1) {
     const int ray = std::countr_zero(left);
+    Hit unused;
     if (caster.cast(rays[static_cast<size_t>(ray)], {stop_size_, 0}, job_.t_min, job_.t_max,
-                    hits[ray]))
+                    hits ? hits[ray] : unused))
       found |= uint64_t{1} << ray;
   }
   return found;

@@ -28,6 +28,8 @@ class RayPacket {
   // Casts up to kRays rays. Returns a mask: bit i is set if ray i has a hit, which is then in
   // hits[i]. `hits` must have room for one hit per ray. Throws Error{kCorrupt} for a damaged DAG.
   uint64_t cast(std::span<const Ray> rays, Hit* hits);
+  // Returns the same mask as cast(), but does not compute the hits.
+  uint64_t occluded(std::span<const Ray> rays) { return cast(rays, nullptr); }
 
  private:
   void load(std::span<const Ray> rays);

@@ -57,9 +57,8 @@ Vec Lighting::sky_light(const SurfaceHit& s, int rays, const Sampler& sampler) c
 }
 
 bool Lighting::sees(const SurfaceHit& s, const Vec& sun) const {
-  Hit hit;
   return dot(s.normal, sun) > 0 &&
-         !caster_.cast({s.start, sun}, {s.size, kSunWidening}, 0, kSkyDistance, hit);
+         !caster_.occluded({s.start, sun}, {s.size, kSunWidening}, 0, kSkyDistance);
 }
 
 double Lighting::sun_light(const SurfaceHit& s, const Sampler& sampler) const {

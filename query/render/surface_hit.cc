@@ -96,8 +96,7 @@ bool find_surface(const DagView& dag, const Ray& ray, double pixel_spread, Surfa
   // In a narrow place, the start can be in an occupied cell. Then the start is replaced by the
   // point on the ray 1.5 cells before the hit. That point is free unless the camera is in an
   // occupied cell or closer than 1.5 cells to the hit.
-  if (caster.cast({s.start, s.normal}, {s.size, 0}, 0, 0, hit))
-    s.start = ray.at(s.t - 1.5 * s.size);
+  if (caster.occluded({s.start, s.normal}, {s.size, 0}, 0, 0)) s.start = ray.at(s.t - 1.5 * s.size);
   return true;
 }
 

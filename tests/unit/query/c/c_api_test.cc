@@ -114,6 +114,8 @@ TEST_F(CApiTest, Rays) {
         {{std::fmod(0.37 * i, edge), edge + 1, std::fmod(0.73 * i, edge)}, {0.01, -3, 0.02}});
   std::vector<voxdag_hit> hits(rays.size());
   ASSERT_EQ(voxdag_cast_rays(file_, rays.data(), rays.size(), nullptr, hits.data()), VOXDAG_OK);
+  std::vector<uint8_t> occluded(rays.size(), 2);
+  ASSERT_EQ(voxdag_occluded(file_, rays.data(), rays.size(), nullptr, occluded.data()), VOXDAG_OK);
   uint64_t found = 0;
   for (size_t i = 0; i < rays.size(); ++i) {
     RayHit hit;
@@ -121,6 +123,7 @@ TEST_F(CApiTest, Rays) {
     const Coordinates direction{rays[i].direction[0], rays[i].direction[1], rays[i].direction[2]};
     dag_.rays({&origin, 1}, {&direction, 1}, {}, {&hit, 1});
     ASSERT_EQ(std::isfinite(hits[i].distance), hit.hit);
+    ASSERT_EQ(occluded[i], hit.hit);
     if (!hit.hit) {
       EXPECT_EQ(hits[i].voxel[0], -1);
       continue;
@@ -176,6 +179,10 @@ TEST_F(CApiTest, Refuses) {
   voxdag_hit hit;
   EXPECT_EQ(voxdag_cast_rays(file_, &still, 1, nullptr, &hit), VOXDAG_INVALID_INPUT);
   EXPECT_EQ(voxdag_cast_rays(file_, &nowhere, 1, nullptr, &hit), VOXDAG_INVALID_INPUT);
+  uint8_t occluded = 0;
+  EXPECT_EQ(voxdag_occluded(file_, &still, 1, nullptr, &occluded), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_occluded(file_, &still, 1, nullptr, nullptr), VOXDAG_INVALID_INPUT);
+  EXPECT_EQ(voxdag_occluded(nullptr, &still, 1, nullptr, &occluded), VOXDAG_INVALID_INPUT);
   voxdag_close(nullptr);
 }
 

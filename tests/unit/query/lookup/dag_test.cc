@@ -276,6 +276,7 @@ TEST(Dag, SurvivesDamage) {
       tries([&] { dag.lookup(points, 5, set); });
       tries([&] { dag.nearest(points, 5, 1000, found); });
       tries([&] { dag.rays(origins, directions, {}, hits); });
+      tries([&] { dag.occluded(origins, directions, {}, set); });
       tries([&] { dag.box(all, cells); });
       tries([&] { dag.count(all); });
       tries([&] { DagFile(path, 0).count({4, whole_grid(3)}); });

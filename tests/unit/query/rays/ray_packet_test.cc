@@ -52,10 +52,12 @@ void expect_equal(WalkPacket walk, const DagView& dag, const std::vector<Ray>& r
   for (size_t first = 0; first < rays.size(); first += packet_rays) {
     const size_t count = std::min(packet_rays, rays.size() - first);
     const uint64_t have_hit = packet->cast(std::span(rays).subspan(first, count), found);
+    ASSERT_EQ(packet->occluded(std::span(rays).subspan(first, count)), have_hit);
     for (size_t i = 0; i < count; ++i) {
       Hit hit;
       const bool expected = caster.cast(rays[first + i], {stop_size, 0}, t_min, t_max, hit);
       ASSERT_EQ(static_cast<bool>(have_hit >> i & 1), expected) << "ray " << first + i;
+      ASSERT_EQ(caster.occluded(rays[first + i], {stop_size, 0}, t_min, t_max), expected);
       if (!expected) continue;
       ++hits;
       ASSERT_EQ(found[i].t, hit.t) << "ray " << first + i;
@@ -162,6 +164,60 @@ TEST_F(DagRays, RefusesWhatIsNoRay) {
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, inf}), ErrorCode::kInvalidInput);
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {nan, 0}), ErrorCode::kInvalidInput);
   EXPECT_EQ(code_of({0, 0, 0}, {0, 0, 1}, {1, -1}), ErrorCode::kInvalidInput);
+}
+
+// occluded() and rays() agree for all limits of distance and size, also for limits that equal the
+// distance of a hit or differ from it by one bit.
+TEST(DagOccluded, EqualsTheRaysWithAHit) {
+  uint64_t occluded = 0, open = 0;
+  for (const int edge : {4, 16, 64}) {
+    const QueryFile file(random_voxels(static_cast<uint64_t>(edge) + 1, edge));
+    const DagFile dag(file.path());
+    std::vector<Coordinates> origins, directions;
+    for (const Ray& ray : many_rays(edge, 23)) {
+      origins.push_back({ray.origin[0], ray.origin[1], ray.origin[2]});
+      directions.push_back({ray.direction[0], ray.direction[1], ray.direction[2]});
+    }
+    std::vector<RayHit> hits(origins.size());
+    std::vector<uint8_t> found(origins.size(), 2);
+    for (const double stop_size : {0.0, 1.0, 2.0, 4.0, 2.0 * edge})
+      for (const double distance : {0.0, 0.5, 1.0, 0.75 * edge, kFarAway}) {
+        dag.rays(origins, directions, {distance, stop_size}, hits);
+        dag.occluded(origins, directions, {distance, stop_size}, found, 2);
+        for (size_t i = 0; i < hits.size(); ++i) {
+          ASSERT_EQ(found[i], hits[i].hit) << "ray " << i << " within " << distance;
+          ++(hits[i].hit ? occluded : open);
+        }
+      }
+    dag.rays(origins, directions, {}, hits);
+    for (size_t i = 0; i < hits.size(); i += 97) {
+      if (!hits[i].hit) continue;
+      const double distance = hits[i].distance;
+      for (const double limit : {std::nextafter(distance, 0), distance}) {
+        uint8_t one = 2;
+        dag.occluded({&origins[i], 1}, {&directions[i], 1}, {limit, 0}, {&one, 1});
+        ASSERT_EQ(one, limit == distance) << "ray " << i;
+        if (distance == 0) break;
+      }
+    }
+  }
+  EXPECT_GT(occluded, 10000u);
+  EXPECT_GT(open, 10000u);
+}
+
+TEST_F(DagRays, OcclusionRefusesWrongArguments) {
+  const Coordinates origin{0, 0, 0}, along_z{0, 0, 1}, zero{0, 0, 0};
+  uint8_t occluded[2];
+  const auto code_of = [&](const Coordinates& direction, const RayLimits& limits, size_t results) {
+    return error_of([&] {
+             dag_.occluded({&origin, 1}, {&direction, 1}, limits, {occluded, results});
+           })
+        .code();
+  };
+  EXPECT_EQ(code_of(zero, {}, 1), ErrorCode::kInvalidInput);
+  EXPECT_EQ(code_of(along_z, {-1, 0}, 1), ErrorCode::kInvalidInput);
+  EXPECT_EQ(code_of(along_z, {1, -1}, 1), ErrorCode::kInvalidInput);
+  EXPECT_EQ(code_of(along_z, {}, 2), ErrorCode::kInvalidInput);
 }
 
 // Casts so many rays that they are divided into several batches. One thread and four threads find
