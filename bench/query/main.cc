@@ -1,11 +1,13 @@
 // Measures the speed of queries on one core, with the file in memory. It compares this library, a
 // plain loop over the reader, and OpenVDB and OctoMap (if they are installed) on the same cells.
 //
-//     bench_query [--levels N] [--picture EDGE] FILE.vdag...
+//     bench_query [--levels N] [--picture EDGE] [--rays] [--scene SCENE] FILE.vdag...
 //
 // --levels: the queries use the grid of 2^N cells per edge (default: the file's grid), and rays
 // stop at its cells. --picture: casts rays through the pixels of a square picture with this edge
-// (default: 1024).
+// (default: 1024). --rays: measures only rays. --scene: also casts the rays with Embree (if it is
+// installed) at the triangles of this scene, from which the following files were built.
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +15,7 @@
 #include <limits>
 #include <string>
 
+#include "bench/query/embree.h"
 #include "bench/query/others.h"
 #include "bench/query/query_set.h"
 #include "query/rays/ray_caster.h"
@@ -26,6 +29,8 @@ constexpr size_t kReaderBoxes = 20;
 // The other libraries get grids of at most 2^11 cells per edge, because OctoMap needs about 5 GB of
 // memory for Sponza on a grid of this size.
 constexpr uint32_t kMaxOtherLevels = 11;
+
+constexpr double kEndless = std::numeric_limits<double>::infinity();
 
 // Prints a timing, and whether its `found` differs from expected->found. `expected` is an earlier
 // timing of the same queries. It is null if there is none, or if the two results need not be equal.
@@ -85,33 +90,92 @@ void lookups(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries, 
           });
 }
 
-Timing rays(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries) {
-  const double cell = static_cast<double>(int64_t{1} << (dag.grid_levels() - grid_levels));
-  std::vector<Coordinates> origins = queries.origins;
-  for (Coordinates& origin : origins)
+// The rays of a picture, and the rays from their hits toward a light, in voxels of the file. A ray
+// to the light begins two cells before the hit, so that the hit cell and its neighbors on a slope
+// do not hide the light.
+struct PictureRays {
+  RaySet primary, shadows;
+};
+
+PictureRays picture_rays(const DagFile& dag, double cell, const QuerySet& queries) {
+  const double length = std::sqrt(0.35 * 0.35 + 0.87 * 0.87 + 0.35 * 0.35);
+  const Coordinates light = {0.35 / length, 0.87 / length, 0.35 / length};
+  PictureRays rays{{queries.origins, queries.directions}, {}};
+  for (Coordinates& origin : rays.primary.origins)
     for (double& c : origin) c *= cell;
-  const size_t count = origins.size();
-  std::vector<RayHit> hits(count);
-  const Timing packets = best_of_three(count, [&] {
-    dag.rays(origins, queries.directions, {std::numeric_limits<double>::infinity(), cell}, hits);
-    uint64_t found = 0;
-    for (const RayHit& hit : hits) found += hit.hit;
-    return found;
+  std::vector<RayHit> hits(rays.primary.origins.size());
+  dag.rays(rays.primary.origins, rays.primary.directions, {kEndless, cell}, hits);
+  for (size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].hit) continue;
+    const double t = std::max(0.0, hits[i].distance - 2 * cell);
+    Coordinates start = rays.primary.origins[i];
+    for (size_t axis = 0; axis < 3; ++axis) start[axis] += t * rays.primary.directions[i][axis];
+    rays.shadows.origins.push_back(start);
+    rays.shadows.directions.push_back(light);
+  }
+  return rays;
+}
+
+uint64_t hits_of(const DagFile& dag, double cell, const RaySet& rays, std::vector<RayHit>& hits) {
+  dag.rays(rays.origins, rays.directions, {kEndless, cell}, hits);
+  uint64_t found = 0;
+  for (const RayHit& hit : hits) found += hit.hit;
+  return found;
+}
+
+Timing rays(const DagFile& dag, double cell, const PictureRays& picture) {
+  std::vector<RayHit> hits(picture.primary.origins.size());
+  const Timing primary =
+      best_of_three(hits.size(), [&] { return hits_of(dag, cell, picture.primary, hits); });
+  print("voxdag", "primary rays", primary);
+  const DagView view(dag.file());
+  const RayCaster caster(view);
+  const auto one_by_one = [&](const RaySet& rays) {
+    return best_of_three(rays.origins.size(), [&] {
+      uint64_t found = 0;
+      for (size_t i = 0; i < rays.origins.size(); ++i) {
+        const auto& [o, d] = std::pair(rays.origins[i], rays.directions[i]);
+        const Ray ray{{{o[0], o[1], o[2]}}, {{d[0], d[1], d[2]}}};
+        found += caster.occluded(ray, {cell, 0}, 0, kEndless);
+      }
+      return found;
+    });
+  };
+  print("one ray per call", "primary rays", one_by_one(picture.primary), &primary);
+  if (picture.shadows.origins.empty()) return primary;
+  std::vector<uint8_t> occluded(picture.shadows.origins.size());
+  const Timing shadows = best_of_three(occluded.size(), [&] {
+    dag.occluded(picture.shadows.origins, picture.shadows.directions, {kEndless, cell}, occluded);
+    return sum(occluded);
   });
-  print("voxdag", "primary rays", packets);
-  const Timing single = best_of_three(count, [&] {
-    const DagView view(dag.file());
-    const RayCaster caster(view);
-    uint64_t found = 0;
-    for (size_t i = 0; i < count; ++i) {
-      const auto& [o, d] = std::pair(origins[i], queries.directions[i]);
-      Hit hit;
-      found += caster.cast({{{o[0], o[1], o[2]}}, {{d[0], d[1], d[2]}}}, {cell, 0}, 0, 1e30, hit);
-    }
-    return found;
-  });
-  print("one ray per call", "primary rays", single, &packets);
-  return packets;
+  print("voxdag", "shadow rays, any hit", shadows);
+  hits.resize(occluded.size());
+  const Timing first =
+      best_of_three(hits.size(), [&] { return hits_of(dag, cell, picture.shadows, hits); });
+  print("voxdag", "shadow rays, first hit", first, &shadows);
+  print("one ray per call", "shadow rays, any hit", one_by_one(picture.shadows), &shadows);
+  return primary;
+}
+
+// Embree has the triangles in memory, and voxdag the voxels.
+void embree_rays(const DagFile& dag, const std::string& scene, const PictureRays& picture) {
+  const std::optional<EmbreeTimings> timings =
+      measure_embree(dag, scene, picture.primary, picture.shadows);
+  if (!timings) {
+    std::printf("  %-22s not installed\n", "Embree");
+    return;
+  }
+  std::printf("  %-22s %llu triangles, %.1f MiB; the file with the voxels %.1f MiB\n", "Embree",
+              static_cast<unsigned long long>(timings->triangles),
+              static_cast<double>(timings->bytes) / 0x1p20,
+              static_cast<double>(dag.file_bytes()) / 0x1p20);
+  std::printf("  %-22s %-22s %10.3f s of CPU time\n", "Embree", "building the tree",
+              timings->build_seconds);
+  print("Embree, one per call", "primary rays", timings->primary);
+  print("Embree, 8 per call", "primary rays", timings->primary_of_8);
+  if (picture.shadows.origins.empty()) return;
+  print("Embree, one per call", "shadow rays, any hit", timings->shadow);
+  print("Embree, 8 per call", "shadow rays, any hit", timings->shadow_of_8);
 }
 
 // Reads the cells of a few boxes one by one.
@@ -159,14 +223,26 @@ void regions(const DagFile& dag, uint32_t grid_levels, const QuerySet& queries, 
         }));
 }
 
-void measure(const std::string& path, uint32_t grid_levels, int picture) {
+struct Settings {
+  uint32_t grid_levels = 20;
+  int picture = 1024;
+  bool only_rays = false;
+  std::string scene;  // empty: no Embree
+};
+
+void measure(const std::string& path, const Settings& settings) {
   const DagFile dag(path);
-  const uint32_t levels = std::min(grid_levels, dag.grid_levels());
+  const uint32_t levels = std::min(settings.grid_levels, dag.grid_levels());
   std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
-  const QuerySet queries = make_queries(dag, levels, kPoints, picture);
+  const QuerySet queries =
+      make_queries(dag, levels, settings.only_rays ? 0 : kPoints, settings.picture);
   Timings own;
-  lookups(dag, levels, queries, own);
-  own.rays = rays(dag, levels, queries);
+  if (!settings.only_rays) lookups(dag, levels, queries, own);
+  const double cell = static_cast<double>(int64_t{1} << (dag.grid_levels() - levels));
+  const PictureRays picture = picture_rays(dag, cell, queries);
+  own.rays = rays(dag, cell, picture);
+  if (!settings.scene.empty()) embree_rays(dag, settings.scene, picture);
+  if (settings.only_rays) return;
   regions(dag, levels, queries, own);
   for (const auto& [measure_other, who] : kOtherLibraries) {
     if (levels > kMaxOtherLevels) {
@@ -187,15 +263,18 @@ void measure(const std::string& path, uint32_t grid_levels, int picture) {
 }
 
 int run(int argc, char** argv) {
-  uint32_t levels = 20;
-  int picture = 1024;
+  Settings settings;
   for (int i = 1; i < argc; ++i) {
     if (std::strcmp(argv[i], "--levels") == 0 && i + 1 < argc)
-      levels = static_cast<uint32_t>(std::atoi(argv[++i]));
+      settings.grid_levels = static_cast<uint32_t>(std::atoi(argv[++i]));
     else if (std::strcmp(argv[i], "--picture") == 0 && i + 1 < argc)
-      picture = std::max(8, std::atoi(argv[++i]) / 8 * 8);
+      settings.picture = std::max(8, std::atoi(argv[++i]) / 8 * 8);
+    else if (std::strcmp(argv[i], "--rays") == 0)
+      settings.only_rays = true;
+    else if (std::strcmp(argv[i], "--scene") == 0 && i + 1 < argc)
+      settings.scene = argv[++i];
     else
-      measure(argv[i], levels, picture);
+      measure(argv[i], settings);
   }
   return 0;
 }

@@ -27,13 +27,16 @@ Position random_set_cell(const DagView& dag, uint32_t grid_levels, std::mt19937_
   return p;
 }
 
-}  // namespace
-
-double thread_seconds() {
+double seconds_of(clockid_t clock) {
   timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  clock_gettime(clock, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
+
+}  // namespace
+
+double thread_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
+double process_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
 
 Region box_around(const QuerySet& queries, size_t i) {
   Region box;

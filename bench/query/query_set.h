@@ -9,6 +9,10 @@
 
 namespace voxdag::query {
 
+struct RaySet {
+  std::vector<Coordinates> origins, directions;  // unit vectors as directions
+};
+
 struct QuerySet {
   std::vector<Position> uniform;                 // random points, uniform in the grid
   std::vector<Position> set_cells;               // random set cells
@@ -38,8 +42,9 @@ struct Timings {
   Timing uniform, set_cells, rays, boxes, counts;
 };
 
-// Returns the CPU time of the calling thread, in seconds.
+// Returns the CPU time of the calling thread, and of all threads of the process, in seconds.
 double thread_seconds();
+double process_seconds();
 
 // Calls run() three times. Returns the highest speed, in `items` per second of CPU time of this
 // thread, and the result of run().
