@@ -9,6 +9,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <memory>
@@ -275,7 +276,7 @@ class SpillBuckets {
  public:
   // The buffers of all buckets together take about `bytes`.
   SpillBuckets(const SpillSpace& space, size_t buckets, uint64_t bytes)
-      : chunk_items_(std::clamp<uint64_t>(bytes / sizeof(T) / buckets, 4, 4096)),
+      : chunk_items_(std::bit_floor(std::clamp<uint64_t>(bytes / sizeof(T) / buckets, 4, 4096))),
         buffers_(space.budget, chunk_items_ * buckets, kSpillBuffer),
         file_(space.folder),
         buckets_(buckets) {}
@@ -293,24 +294,34 @@ class SpillBuckets {
     }
   }
   uint64_t size(size_t bucket) const { return buckets_[bucket].size; }
-  // Returns the next item of the bucket, which must have one.
+  // Returns the next item of the bucket, which must have one. The result is valid until the next
+  // call.
   const T& next(size_t bucket) {
     Bucket& from = buckets_[bucket];
-    const uint64_t at = from.read++ % chunk_items_;
     T* const chunk = buffers_.data() + bucket * chunk_items_;
-    if (at == 0)
-      file_.read(from.chunks[(from.read - 1) / chunk_items_] * chunk_items_, chunk,
-                 std::min(chunk_items_, from.size - (from.read - 1)));
-    return chunk[at];
+    if (from.buffered == 0) load(from, chunk);
+    const T& item = chunk[chunk_items_ - from.buffered--];
+    return item;
+  }
+  // Moves back to the first item of the bucket.
+  void rewind(size_t bucket) {
+    buckets_[bucket].loaded = 0;
+    buckets_[bucket].buffered = 0;
   }
 
  private:
   struct Bucket {
     std::vector<uint64_t> chunks;  // numbers of the bucket's chunks in the file
     uint64_t size = 0;
+    // Items in the buffer. While the bucket is read, items of the current chunk that next() has not
+    // returned yet; a chunk that is not full counts as a full one.
     uint64_t buffered = 0;
-    uint64_t read = 0;
+    uint64_t loaded = 0;  // chunks that were loaded into the buffer
   };
+  void load(Bucket& from, T* chunk) {
+    file_.read(from.chunks[from.loaded++] * chunk_items_, chunk, chunk_items_);
+    from.buffered = chunk_items_;
+  }
   // Writes the bucket's buffer as a chunk. Writes all of the buffer even if it is not full, so that
   // all chunks have the same size.
   void store(size_t bucket) {

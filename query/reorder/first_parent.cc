@@ -1,51 +1,19 @@
 #include "query/reorder/first_parent.h"
 
 #include <algorithm>
-#include <compare>
 #include <span>
 #include <string>
 
 #include "core/base/error.h"
 #include "core/base/popcount8.h"
 #include "query/reorder/forwarded_level.h"
+#include "query/reorder/windowed_level.h"
 
 namespace voxdag::query {
 namespace {
 
 constexpr uint64_t kNodesBetweenChecks = 4096;
 constexpr uint64_t kMaxNodeWords = global_layout::kMaxNodeWords;
-
-// A child pointer of the level that is being written. `target` is the word offset of the child in
-// the input file. `number` is the pointer's index among all pointers of the level, in the order of
-// the output file.
-struct Pointer {
-  uint64_t target = 0;
-  uint64_t number = 0;
-  friend auto operator<=>(const Pointer&, const Pointer&) = default;
-};
-
-// The pointer `number`. `first` is the number of the first pointer to the same child.
-struct PointerUse {
-  uint64_t first = 0;
-  uint64_t number = 0;
-  friend auto operator<=>(const PointerUse&, const PointerUse&) = default;
-};
-
-// A node of the next level, with its words from the input file. `first` is the number of the first
-// pointer to it.
-struct MetNode {
-  uint64_t first = 0;
-  uint32_t count = 0;
-  uint32_t words[kMaxNodeWords] = {};
-  friend bool operator<(const MetNode& a, const MetNode& b) { return a.first < b.first; }
-};
-
-// The new value of the pointer `number`: the offset of the child in the output file.
-struct NewPointer {
-  uint64_t number = 0;
-  uint64_t offset = 0;
-  friend auto operator<=>(const NewPointer&, const NewPointer&) = default;
-};
 
 // A node that visit() reads from a queue. `words_ahead` are words of the queue some distance after
 // the node. Most of them are child pointers of nodes that are visited soon, so the caller can
@@ -93,26 +61,6 @@ class LevelOutput {
   uint64_t count_ = 0;    // words in the buffer
   uint64_t written_ = 0;  // words in the file
 };
-
-// Sorts `pointers`, which point to nodes of `level`, by their targets, and finds the first pointer
-// to each target. Adds each node that is a target to `met`, and each pointer to `uses`.
-void find_first_pointers(DagInput& input, uint32_t level, SpillSorter<Pointer>& pointers,
-                         SpillSorter<MetNode>& met, SpillSorter<PointerUse>& uses) {
-  pointers.finish();
-  pointers.begin();
-  for (LevelCursor nodes(input, level); !nodes.at_end(); nodes.next()) {
-    if (pointers.at_end() || pointers.front().target != nodes.offset()) continue;
-    MetNode node{.first = pointers.front().number};
-    node.count = static_cast<uint32_t>(nodes.words().size());
-    std::ranges::copy(nodes.words(), node.words);
-    met.add(node);
-    for (; !pointers.at_end() && pointers.front().target == nodes.offset(); pointers.pop())
-      uses.add({node.first, pointers.front().number});
-  }
-  if (!pointers.at_end())
-    input.corrupt(level, pointers.front().target,
-                  "no node begins here, but a pointer refers to it");
-}
 
 std::span<const uint32_t> root_words(DagInput& input) {
   LevelCursor root(input, 0);
@@ -180,37 +128,26 @@ std::unique_ptr<WordQueue> FirstParentOrder::write_in_memory(uint32_t level,
   return next;
 }
 
-std::unique_ptr<WordQueue> FirstParentOrder::write_by_sorting(uint32_t level,
+std::unique_ptr<WordQueue> FirstParentOrder::write_in_windows(uint32_t level,
                                                               const WordQueue& nodes) {
   auto next = std::make_unique<WordQueue>(space_.folder, space_.budget);
-  SpillSorter<NewPointer> new_pointers(space_);
-  {
-    SpillSorter<MetNode> met(space_);
-    SpillSorter<PointerUse> uses(space_);
-    {
-      SpillSorter<Pointer> pointers(space_);
-      visit(level, nodes, [&](const QueuedNode& node) {
-        for (int i = 0; i < node.children; ++i) pointers.add({node.pointer(i), pointers.size()});
-      });
-      find_first_pointers(input_, level + 1, pointers, met, uses);
-    }
-    met.finish();
-    uses.finish();
-    uses.begin();
-    for (met.begin(); !met.at_end(); met.pop()) {
-      const MetNode& node = met.front();
-      const uint64_t offset = place(level + 1, {node.words, node.count}, *next);
-      for (; !uses.at_end() && uses.front().first == node.first; uses.pop())
-        new_pointers.add({uses.front().number, offset});
-    }
-  }
-  new_pointers.finish();
-  new_pointers.begin();
+  WindowedLevel below(input_, level + 1, space_, level_bytes_ / 8, space_.sorter_bytes);
+  const auto for_each_pointer = [&](const auto& visit_pointer) {
+    visit(level, nodes, [&](const QueuedNode& node) {
+      for (int i = 0; i < node.children; ++i) visit_pointer(node.pointer(i));
+    });
+  };
+  for_each_pointer([&](uint64_t child) { below.request(child); });
+  below.find_first();
+  for_each_pointer([&](uint64_t child) {
+    const std::span<const uint32_t> words = below.first_to(child);
+    if (!words.empty()) below.place(child, place(level + 1, words, *next));
+  });
+  below.resolve(cancel_);
   LevelOutput out(out_, level, is_wide(level), space_.budget);
   visit(level, nodes, [&](const QueuedNode& node) {
     out.add_mask(node.mask);
-    for (int i = 0; i < node.children; ++i, new_pointers.pop())
-      out.add_pointer(new_pointers.front().offset);
+    for (int i = 0; i < node.children; ++i) out.add_pointer(below.offset_of(node.pointer(i)));
   });
   out.flush();
   return next;
@@ -235,7 +172,7 @@ void FirstParentOrder::write_levels() {
   for (uint32_t level = 0; level < bricks; ++level) {
     const voxdag_reader::Level& below = input_.level(level + 1);
     auto next = ForwardedLevel::bytes_of(below) <= level_bytes_ ? write_in_memory(level, *queue)
-                                                                : write_by_sorting(level, *queue);
+                                                                : write_in_windows(level, *queue);
     next->finish();
     if (next->words() != below.word_count)
       input_.corrupt(level + 1, next->words(),

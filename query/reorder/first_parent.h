@@ -7,11 +7,8 @@
 // which gives the child its new offset.
 //
 // If the nodes of the next level fit in memory, they are read directly (forwarded_level.h).
-// Otherwise, three sorts on the disk replace these reads:
-//
-//   1. the child pointers by child, to find the first pointer to each child;
-//   2. the children by their first pointers, which gives their order and so their new offsets;
-//   3. the new pointers by their position in the output file, because they are written in order.
+// Otherwise, the pointers are distributed to windows of the next level (windowed_level.h), and the
+// queue is passed three times.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +25,7 @@ namespace voxdag::query {
 class FirstParentOrder {
  public:
   // All arguments must outlive this object. A level is kept in memory if it needs at most
-  // `level_bytes`. Otherwise, its pointers are sorted in `space`.
+  // `level_bytes`. Otherwise, it is divided into windows, whose lists are in `space`.
   FirstParentOrder(DagInput& input, const SpillSpace& space, uint64_t level_bytes,
                    GlobalFileWriter& out, Progress& progress, const CancelToken& cancel)
       : input_(input),
@@ -45,7 +42,7 @@ class FirstParentOrder {
  private:
   // Write `level`, whose queue is `nodes`. Return the queue of the next level.
   std::unique_ptr<WordQueue> write_in_memory(uint32_t level, const WordQueue& nodes);
-  std::unique_ptr<WordQueue> write_by_sorting(uint32_t level, const WordQueue& nodes);
+  std::unique_ptr<WordQueue> write_in_windows(uint32_t level, const WordQueue& nodes);
   void write_bricks(const WordQueue& bricks);
   bool is_wide(uint32_t level) const;  // true if the nodes of `level` have 64-bit pointers
   template <class Visit>
