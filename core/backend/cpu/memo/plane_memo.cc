@@ -142,44 +142,87 @@ NodeRef PlaneMemo::node(const Plane& plane, PlaneDirection& direction, int64_t f
 
 NodeRef PlaneMemo::tile_node(PlaneDirection& direction, InnerSides inner, int64_t f,
                              int size_log2) {
-  constexpr int kLog2 = PlaneDirection::kSizeLog2;
+  if (size_log2 > LargePlaneNodes::kSizeLog2) {
+    if (direction.add_tile() == kLargeWorthwhile) add_large_nodes(direction);
+    if (LargePlaneNodes* const large = direction.large())
+      return tile_node_of(direction, inner, f, size_log2, *large, [&](int64_t at) -> PlaneNode& {
+        PlaneNode& node = large->at(at);
+        if (node.nodes == 0) make_large_node(direction, inner, at, node);
+        return node;
+      });
+  }
+  return tile_node_of(
+      direction, inner, f, size_log2, direction.small(),
+      [&](int64_t at) -> const PlaneNode& { return direction.small_node(at, tables_, kernels_); });
+}
+
+// Returns the node of a tile with an edge of 2^size_log2 voxels, from smaller nodes. `nodes` are
+// the PlaneNodes of their size. node_at(f) returns the node for a plane's offset from a cube.
+template <int kLog2, class NodeAt>
+NodeRef PlaneMemo::tile_node_of(const PlaneDirection& direction, InnerSides inner, int64_t f,
+                                int size_log2, const PlaneNodes<kLog2>& nodes,
+                                const NodeAt& node_at) {
   // `f` is the plane's offset (plane.h) from the tile's low corner. From the low corner of the
-  // tile's m-th node, the offset is f + 8 * offsets[m].
+  // tile's m-th smaller cube, the offset is f + 2^kLog2 * offsets[m].
   const int64_t* offsets = direction.offsets();
-  const int64_t low = direction.min_offset() - f, high = direction.max_offset() - f;
+  const int64_t low = nodes.min_offset() - f, high = nodes.max_offset() - f;
   const int count = 1 << 3 * (size_log2 - kLog2);
-  PlaneRange crossed{(low + (1 << kLog2) - 1) >> kLog2, high >> kLog2};
+  const PlaneRange crossed{(low + (1 << kLog2) - 1) >> kLog2, high >> kLog2};
   uint64_t existing[8], touched[8];
   kernels_.find_in_range(offsets, count, crossed.low, crossed.high, touched);
   std::copy(touched, touched + 8, existing);
   OctreeCounts counts;
-  if (inner.any()) add_full(offsets, count, inner, crossed, existing, counts);
+  if (inner.any()) add_full(offsets, count, inner, crossed, kLog2, existing, counts);
+  const auto node_of = [&](int m) -> const PlaneNode& {
+    return node_at(f + offsets[m] * (1 << kLog2));
+  };
+  // Makes the large nodes that do not exist yet. This uses the reducer, so it must be done before
+  // the reducer starts with the tile.
+  if constexpr (kLog2 == LargePlaneNodes::kSizeLog2)
+    for (uint64_t rest = touched[0]; rest != 0; rest &= rest - 1) node_of(lowest_bit(rest));
   struct Node {
     uint64_t hash;
     uint32_t id;
   };
   const auto next = [&](int m) -> Node {
     if ((touched[m / 64] >> m % 64 & 1) == 0) return {full_.node(kLog2).hash, full_.node(kLog2).id};
-    const int64_t at_node = f + offsets[m] * (1 << kLog2);
-    const PlaneDirection::Known& known = direction.node(at_node, tables_, kernels_);
-    counts += {known.nodes, known.voxels};
-    filled_ += known.filled;
-    return {known.hash, known.id};
+    const PlaneNode& node = node_of(m);
+    counts += {node.nodes, node.voxels};
+    filled_ += node.filled;
+    return {node.hash, node.id};
   };
   const NodeRef found = reducer_.reduce_nodes(existing, kLog2, size_log2, next);
   tables_.counts() += counts;
   return found;
 }
 
+void PlaneMemo::add_large_nodes(PlaneDirection& direction) {
+  if (!fits_budget((large_nodes_.size() + 1) * sizeof(LargePlaneNodes))) return;
+  LargePlaneNodes& large = *large_nodes_.emplace_back(memory_, 1).data();
+  large.set_up(direction.plane());
+  direction.set_large(&large);
+}
+
+void PlaneMemo::make_large_node(PlaneDirection& direction, InnerSides inner, int64_t f,
+                                PlaneNode& node) {
+  const OctreeCounts before = tables_.counts();
+  const uint64_t filled_before = filled_;
+  const NodeRef made = tile_node(direction, inner, f, LargePlaneNodes::kSizeLog2);
+  node = PlaneNode(made, tables_.counts() - before, filled_ - filled_before);
+  tables_.counts() = before;
+  filled_ = filled_before;
+}
+
 void PlaneMemo::add_full(const int64_t* offsets, int count, InnerSides inner,
-                         const PlaneRange& crossed, uint64_t (&existing)[8], OctreeCounts& counts) {
+                         const PlaneRange& crossed, int from_log2, uint64_t (&existing)[8],
+                         OctreeCounts& counts) {
   const PlaneRange all = crossed.with(inner);
   uint64_t touched = 0, set = 0;
   for (int w = 0; w < (count + 63) / 64; ++w)
     touched += static_cast<uint64_t>(popcount64(existing[w]));
   kernels_.find_in_range(offsets, count, all.low, all.high, existing);
   for (int w = 0; w < (count + 63) / 64; ++w) set += static_cast<uint64_t>(popcount64(existing[w]));
-  const OctreeCounts full = full_counts(PlaneDirection::kSizeLog2);
+  const OctreeCounts full = full_counts(from_log2);
   counts += {(set - touched) * full.nodes, (set - touched) * full.voxels};
   filled_ += (set - touched) * full.voxels;
 }

@@ -6,7 +6,8 @@
 //                    degrees. The nodes for every offset and size of cube are in a hash table.
 //                    Keys of the table contain all inputs, so a hit is exact.
 //   other planes     The nodes of 8^3 voxels are stored by direction (plane_direction.h), for
-//                    triangles that have covered at least kWorthwhile tiles.
+//                    triangles that have covered at least kWorthwhile tiles. The nodes of 16^3
+//                    voxels are also stored, for directions with kLargeWorthwhile tiles.
 //
 // For a solid, a node can also contain the inner sides of its plane (InnerSides).
 //
@@ -85,6 +86,8 @@ class PlaneMemo {
   //   kNever               the memo does not accept the triangle's plane
   static constexpr uint32_t kWorthwhile = 24;
   static constexpr uint32_t kNever = UINT32_MAX;
+  // Number of tiles after which a direction gets its nodes of 16^3 voxels.
+  static constexpr uint32_t kLargeWorthwhile = 128;
 
   // Returns the index in planes_ of a triangle's plane; nullopt if the memo does not have the
   // plane. Adds `tiles` to the tiles that the triangle has covered, and adds the plane to the memo
@@ -100,12 +103,17 @@ class PlaneMemo {
   NodeRef full_node(int size_log2);
   NodeRef node(const Plane& plane, PlaneDirection& direction, int64_t f, int size_log2);
   NodeRef tile_node(PlaneDirection& direction, InnerSides inner, int64_t f, int size_log2);
-  // Adds the full cubes of 8^3 voxels on the inner sides of a plane to the bit set `existing`,
-  // which has the cubes that the plane crosses. Adds the nodes and voxels of the full cubes to
-  // `counts`. `offsets`: PlaneDirection::offsets(). `count`: number of cubes of 8^3 voxels.
+  template <int kLog2, class NodeAt>
+  NodeRef tile_node_of(const PlaneDirection& direction, InnerSides inner, int64_t f, int size_log2,
+                       const PlaneNodes<kLog2>& nodes, const NodeAt& node_at);
+  void add_large_nodes(PlaneDirection& direction);
+  void make_large_node(PlaneDirection& direction, InnerSides inner, int64_t f, PlaneNode& node);
+  // Adds the full cubes of 2^from_log2 voxels per edge, on the inner sides of a plane, to the bit
+  // set `existing`, which has the cubes that the plane crosses. Adds the nodes and voxels of the
+  // full cubes to `counts`. `offsets`: PlaneDirection::offsets(). `count`: number of cubes.
   // `crossed`: range of the offsets at which the plane crosses a cube.
   void add_full(const int64_t* offsets, int count, InnerSides inner, const PlaneRange& crossed,
-                uint64_t (&existing)[8], OctreeCounts& counts);
+                int from_log2, uint64_t (&existing)[8], OctreeCounts& counts);
   SmallNode& small_slot(uint64_t key);
   // Makes free slots: enlarges the table or, if the budget does not allow this, clears the table.
   void reserve_small_nodes();
@@ -121,6 +129,7 @@ class PlaneMemo {
   PooledArray<KnownPlane> planes_;
   uint32_t plane_count_ = 0;
   std::vector<PooledArray<PlaneDirection>> directions_;
+  std::vector<PooledArray<LargePlaneNodes>> large_nodes_;
   PooledArray<SmallNode> small_nodes_;
   uint64_t small_slots_ = 0;  // a power of two
   uint64_t small_count_ = 0;

@@ -96,6 +96,12 @@ int compare(Workshop& by_memo, Workshop& by_drawing, const TriangleSet& set, con
   return compared;
 }
 
+// Builds a cube so often that the memo makes all kinds of nodes for the plane's direction.
+void use_often(Workshop& shop, const TriangleSet& set, const LatticeCube& box, int size_log2) {
+  NodeRef node;
+  for (int i = 0; i < 200; ++i) EXPECT_TRUE(shop.planes.build(set, {0}, box, size_log2, node));
+}
+
 // Compares the nodes that PlaneMemo returns with nodes built by drawing the triangle. Both must
 // exist for the same cubes, and have the same hashes and counts. The components of the normals are
 // at most 1 (walls and diagonals), 12 or 300, each in a third of the rounds.
@@ -125,7 +131,10 @@ void expect_memo_equals_drawing(VoxelRule rule) {
     bool found = false;
     for (int i = 0; i < 40 && !found; ++i)
       found = by_memo.planes.build(set, {0}, box_of(region), size_log2, node);
-    if (found) compared += compare(by_memo, by_drawing, set, box_of(region), size_log2, *tile);
+    if (!found) continue;
+    // In every second round, the direction has enough tiles for nodes of 16^3 voxels.
+    if (round % 2 == 1) use_often(by_memo, set, box_of(region), size_log2);
+    compared += compare(by_memo, by_drawing, set, box_of(region), size_log2, *tile);
     if (testing::Test::HasFailure()) return;
   }
   EXPECT_GT(compared, 500);
@@ -133,6 +142,66 @@ void expect_memo_equals_drawing(VoxelRule rule) {
 
 TEST(Planes, NodesFromTheMemoEqualDrawnOnes) { expect_memo_equals_drawing(VoxelRule::kShell); }
 TEST(Planes, ThinNodesFromTheMemoEqualDrawnOnes) { expect_memo_equals_drawing(VoxelRule::kThin); }
+
+// A memo that knows the plane of a triangle.
+struct PlaneOfTriangle {
+  explicit PlaneOfTriangle(const oracle::Triangle& t)
+      : shop(portable_kernels(), VoxelRule::kShell), set(shop.memory) {
+    set.add(axis_major(oracle::fixed(t)));
+    for (int i = 0; i < 40 && !found; ++i) found = shop.planes.find_plane(set, {0}, 8);
+  }
+
+  struct Tile {
+    NodeRef node;
+    OctreeCounts counts;
+    uint64_t filled = 0;
+  };
+  Tile tile(InnerSides inner, int64_t f, int size_log2) {
+    const OctreeCounts before = shop.tables.counts();
+    Tile tile;
+    EXPECT_TRUE(shop.planes.build_tile(*found, inner, f, size_log2, tile.node, tile.filled));
+    tile.counts = shop.tables.counts() - before;
+    return tile;
+  }
+
+  Workshop shop;
+  TriangleSet set;
+  std::optional<PlaneMemo::Found> found;
+};
+
+// Tiles of a plane with inner sides are the same from nodes of 8^3 and of 16^3 voxels.
+TEST(Planes, LargeAndSmallNodesGiveTheSameTilesOfSolids) {
+  oracle::Random random(8);
+  int compared = 0;
+  for (int round = 0; round < 40; ++round) {
+    std::array<int64_t, 3> n;
+    for (int64_t& x : n) x = random.between(20, 300) * (random.between(0, 1) * 2 - 1);
+    const oracle::Triangle t = covering(random_region(random, 8), n, random);
+    if (!is_narrow(t)) continue;
+    SCOPED_TRACE(testing::Message() << "normal " << n[0] << ' ' << n[1] << ' ' << n[2]);
+    PlaneOfTriangle large(t);
+    if (!large.found) continue;
+    const Plane& plane = large.found->plane;
+    for (const InnerSides inner : {InnerSides{true, false}, InnerSides{false, true}}) {
+      for (int i = 0; i < 200; ++i) large.tile(inner, -plane.up, kTileLog2);
+      PlaneOfTriangle small(t);
+      for (int i = 0; i < 60; ++i) {
+        const int size_log2 = 5 + i % 2;
+        const int64_t last = (1 << size_log2) - 1;
+        const int64_t f = random.between(-plane.up - last * plane.rising(),
+                                         plane.width - plane.up - last * plane.falling());
+        const auto a = large.tile(inner, f, size_log2), b = small.tile(inner, f, size_log2);
+        ASSERT_TRUE(a.node.exists && b.node.exists);
+        ASSERT_EQ(a.node.hash, b.node.hash);
+        ASSERT_EQ(a.filled, b.filled);
+        ASSERT_EQ(a.counts.nodes, b.counts.nodes);
+        ASSERT_EQ(a.counts.voxels, b.counts.voxels);
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 1000);
+}
 
 // Plane::fits() rejects large cubes for a plane with a huge normal, because values of the plane in
 // such cubes exceed 62 bits. The memo then does not use the plane.
