@@ -401,9 +401,9 @@ std::string advice(const BuildJob& job, ErrorCode code) {
   if (code == ErrorCode::kNoSpace)
     return full_disk_advice(job.store->leaves(), job.spec.geometry.attributes.any());
   if (code == ErrorCode::kCanceled && job.spec.run.cluster)
-    return "; its tasks run on: run the same command again to follow them, or stop them with "
-           "voxdag stop-tasks";
-  if (code == ErrorCode::kCanceled) return "; run the same command again to resume";
+    return "; its tasks run on: " + repeat_text() +
+           " to follow them, or stop them with voxdag stop-tasks";
+  if (code == ErrorCode::kCanceled) return "; " + repeat_text() + " to resume";
   return "";
 }
 

@@ -24,7 +24,7 @@ void raise(const Error& error) {
 }  // namespace voxdag::python
 
 NB_MODULE(_native, module) {
-  voxdag::set_option_speller(&voxdag::spell_as_keyword);
+  voxdag::set_audience(voxdag::kPythonUsers);
   nb::register_exception_translator([](const std::exception_ptr& thrown, void*) {
     try {
       std::rethrow_exception(thrown);

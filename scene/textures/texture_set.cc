@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/base/text.h"
 #include "core/color/cutouts/hidden.h"
@@ -171,8 +172,8 @@ void TextureReader::load(uint64_t page, size_t slot) {
   if (page_checksum(texels) != checksums_[page])
     throw Error(ErrorCode::kCorrupt,
                 file_->path() + " at offset " + std::to_string(page * kPageBytes) +
-                    " fails its checksum: expected the texels that were written there; run the "
-                    "same command again");
+                    " fails its checksum: expected the texels that were written there; " +
+                    repeat_text());
   page_in_slot_[slot] = page;
 }
 

@@ -5,6 +5,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/checksum.h"
 #include "scene/formats/formats.h"
 #include "scheduler/cluster/cluster.h"
@@ -179,10 +180,9 @@ BuildReport SlurmMergeJob::follow(const std::string& submitted) {
       }
     }
     if (context_.cancel.canceled())
-      throw Error(ErrorCode::kCanceled,
-                  "canceled; job " + id +
-                      " and its tasks run on: run the same command again to follow them, or stop "
-                      "them with voxdag stop-tasks");
+      throw Error(ErrorCode::kCanceled, "canceled; job " + id +
+                                            " and its tasks run on: " + repeat_text() +
+                                            " to follow them, or stop them with voxdag stop-tasks");
     std::this_thread::sleep_for(
         std::chrono::duration<double>(std::min(kFilesPauseS, options_.slurm_interval_s)));
   }
@@ -244,8 +244,8 @@ void SlurmMergeJob::fail(const std::string& id, const std::optional<SlurmEnd>& e
   throw Error(end ? code_of(*end) : ErrorCode::kIo,
               "the job " + id + " that merges has ended without a result: " +
                   (end ? end->text() : "Slurm does not report how") +
-                  (log_end.empty() ? "" : "; its log " + log + " ends with:\n" + log_end) +
-                  "\nthe same command submits it again");
+                  (log_end.empty() ? "" : "; its log " + log + " ends with:\n" + log_end) + "\n" +
+                  repeat_text() + " to submit it again");
 }
 
 }  // namespace

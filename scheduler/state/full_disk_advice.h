@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "scheduler/state/job_store.h"
 
@@ -10,7 +11,8 @@ namespace voxdag {
 
 // Returns advice about a full disk for the end of an error message. The disk needs space for the
 // artifacts of all subvolumes, estimated from the built subvolumes, and for a global file of about
-// the same size. Colors need additional space.
+// the same size. Colors need additional space. The advice says how the users of this process resume
+// the build.
 inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, bool has_colors) {
   double built = 0, planned = 0, bytes = 0;
   for (const StoredSubvolume& subvolume : leaves) {
@@ -21,9 +23,9 @@ inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, boo
   if (built > 0 && bytes > 0) {
     const double artifacts = bytes * (1 + planned / built);
     needed = "about " + size_text(static_cast<uint64_t>(2 * artifacts - bytes)) + " of ";
-    if (has_colors) needed = "the space for colors (voxdag plan estimates it) and " + needed;
+    if (has_colors) needed = "the space for colors (a plan estimates it) and " + needed;
   }
-  return "; the job is paused: free " + needed + "disk space and run the same command again";
+  return "; the finished work is kept: free " + needed + "disk space and " + repeat_text();
 }
 
 }  // namespace voxdag

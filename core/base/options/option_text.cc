@@ -5,7 +5,7 @@
 namespace voxdag {
 namespace {
 
-std::atomic<OptionSpeller> g_speller{&spell_for_command_line};
+std::atomic<const Audience*> g_audience{&kCommandLineUsers};
 
 // Returns the value as JSON and Python write it: numbers as they are, lists of numbers in brackets,
 // and texts in quotation marks.
@@ -35,10 +35,12 @@ std::string spell_as_keyword(std::string_view name, std::string_view value) {
   return value.empty() ? text : text + '=' + literal(value, '(', ')');
 }
 
-void set_option_speller(OptionSpeller speller) { g_speller = speller; }
+void set_audience(const Audience& audience) { g_audience = &audience; }
 
 std::string option_text(std::string_view name, std::string_view value) {
-  return g_speller.load()(name, value);
+  return g_audience.load()->spell_option(name, value);
 }
+
+std::string repeat_text() { return g_audience.load()->repeat; }
 
 }  // namespace voxdag

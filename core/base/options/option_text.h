@@ -1,5 +1,6 @@
-// Spells the names of options in messages. The same message can reach users of the command line, of
-// Python and of the HTTP API, who write an option in different ways.
+// Words of messages that depend on the reader. The same message can reach users of the command
+// line, of Python and of the HTTP API. They write an option in different ways, and they repeat a
+// failed operation in different ways.
 #pragma once
 
 #include <string>
@@ -19,10 +20,24 @@ std::string spell_as_member(std::string_view name, std::string_view value);
 // "hash_bits", "level=11", "region=(0,0,0,4,4,4)": keyword arguments of Python.
 std::string spell_as_keyword(std::string_view name, std::string_view value);
 
-// Sets the speller of this process. Call it before the process starts threads.
-void set_option_speller(OptionSpeller speller);
+// The users who read the messages of a process.
+struct Audience {
+  OptionSpeller spell_option;
+  // How they repeat a failed operation: a clause such as "run the same command again".
+  const char* repeat;
+};
+
+inline constexpr Audience kCommandLineUsers{&spell_for_command_line, "run the same command again"};
+inline constexpr Audience kPythonUsers{&spell_as_keyword, "make the same call again"};
+
+// Sets the audience of this process, which is kCommandLineUsers by default. `audience` must remain
+// valid until the process ends. Call it before the process starts threads.
+void set_audience(const Audience& audience);
 
 // Returns the option as the users of this process write it, or "" if they cannot set it.
 std::string option_text(std::string_view name, std::string_view value = {});
+
+// Returns how the users of this process repeat a failed operation: Audience::repeat.
+std::string repeat_text();
 
 }  // namespace voxdag

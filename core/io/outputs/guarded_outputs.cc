@@ -1,6 +1,7 @@
 #include "core/io/outputs/guarded_outputs.h"
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 
 namespace voxdag {
 namespace {
@@ -9,7 +10,8 @@ namespace {
   throw Error(ErrorCode::kInvalidInput,
               path +
                   " was created or changed by another program during this command, so it is kept: "
-                  "expected a free name; move the file and run the same command again");
+                  "expected a free name; move the file and " +
+                  repeat_text());
 }
 
 }  // namespace

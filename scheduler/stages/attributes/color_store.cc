@@ -9,6 +9,7 @@
 #include "core/base/background.h"
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/format/bytes.h"
 
 namespace voxdag {
@@ -123,7 +124,8 @@ void ColorStore::read(const Place& place, std::vector<std::byte>& out) const {
   if (checksum64(out) != place.checksum)
     throw Error(ErrorCode::kCorrupt, path_ + " at offset " + std::to_string(place.offset) +
                                          " fails its checksum: expected the colors that were "
-                                         "written there; run the same command again");
+                                         "written there; " +
+                                         repeat_text());
 }
 
 ColorStore::Place ColorStore::add(const Checksum128& key, uint64_t number, bool is_last,

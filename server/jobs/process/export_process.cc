@@ -54,7 +54,7 @@ ExportResult write_format(FileSystem& files, const voxdag_reader::File& file, co
 
 std::string run_export(FileSystem& caller_files, const JobTask& task, Progress& progress,
                        const CancelToken& cancel) {
-  set_option_speller(&spell_export_option);
+  set_audience(kExportUsers);
   const ExportSpec spec = parse_export_spec(task.request);
   SpaceReserve files(caller_files, task.min_free_bytes);
   const auto file = open_global_file(kExportInput);

@@ -123,7 +123,7 @@ std::string build(const BuildSpec& spec, const JobFolder& folder, const BuildCon
 std::string do_task(FileSystem& files, const JobFolder& folder, Progress& progress,
                     const CancelToken& cancel) {
   const JobTask task = read_task(files, folder.task());
-  set_option_speller(&spell_job_option);
+  set_audience(kJobUsers);
   link_uploads(task);
   if (task.kind == JobTask::Kind::kExport) return run_export(files, task, progress, cancel);
   ConfinedFiles readable = confined(files, task, folder);

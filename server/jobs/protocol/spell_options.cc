@@ -1,6 +1,5 @@
 #include "server/jobs/protocol/spell_options.h"
 
-#include "core/base/options/option_text.h"
 #include "scheduler/spec/build_fields.h"
 
 namespace voxdag::server {

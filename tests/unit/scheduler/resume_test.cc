@@ -387,7 +387,8 @@ TEST_F(ResumeTest, SaysHowToResume) {
     run_build(spec(), {system_files(), progress, cancel});
     FAIL() << "the build was not interrupted";
   } catch (const Error& error) {
-    EXPECT_NE(error.message().find("same command"), std::string::npos) << error.what();
+    EXPECT_TRUE(error.message().ends_with("; run the same command again to resume"))
+        << error.what();
   }
 }
 

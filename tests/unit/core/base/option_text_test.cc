@@ -25,10 +25,12 @@ TEST(OptionTextTest, SpellsKeywordsOfPython) {
   EXPECT_EQ(spell_as_keyword("grid", "mask"), "grid=\"mask\"");
 }
 
-TEST(OptionTextTest, TheSpellerCanBeReplaced) {
-  set_option_speller(&spell_as_member);
-  EXPECT_EQ(option_text("level"), "'level'");
-  set_option_speller(&spell_for_command_line);
+TEST(OptionTextTest, WordsFollowTheAudience) {
+  EXPECT_EQ(repeat_text(), "run the same command again");
+  set_audience(kPythonUsers);
+  EXPECT_EQ(option_text("level"), "level");
+  EXPECT_EQ(repeat_text(), "make the same call again");
+  set_audience(kCommandLineUsers);
   EXPECT_EQ(option_text("level"), "--level");
 }
 

@@ -42,6 +42,12 @@ TEST(SpellOptionsTest, NoOtherOptionIsSpelledAsAMember) {
   fields(visit, cluster);
 }
 
+// Clients cannot run a command again.
+TEST(SpellOptionsTest, ClientsRepeatRequests) {
+  EXPECT_STREQ(kJobUsers.repeat, "retry the job");
+  EXPECT_STREQ(kExportUsers.repeat, "request the export again");
+}
+
 TEST(SpellOptionsTest, ExportsHaveTheirOwnMemory) {
   EXPECT_EQ(spell_export_option("memory", ""), "exports.memory of the service");
   EXPECT_EQ(spell_export_option("level", "11"), "\"level\": 11");
