@@ -118,6 +118,7 @@ class Filler {
     if (depth == labels_.levels().brick_depth()) return fill_brick(cube);
     uint64_t outside = 0;
     if (!pack_outside(depth, cube, outside)) return fill_octants(depth, cube);
+    if (outside == 0 && !keeps_closed_) return full(size_log2(depth));  // all its voxels are set
     FilledNodes& nodes = filled_[static_cast<size_t>(depth)];
     const FilledNode& known = nodes.find(memory_, cube.row, outside);
     if (known.row_plus_1 != 0) {

@@ -24,20 +24,6 @@ void append(PooledMemory& memory, PooledArray<T>& array, uint64_t size, T value)
 
 }  // namespace
 
-LabeledCube octant_of(const SpaceLabels& labels, int depth, const LabeledCube& cube, int octant,
-                      uint32_t closed, std::vector<uint32_t>& numbers) {
-  const NodeLevels& levels = labels.levels();
-  LabeledCube out{levels.has_child(depth, cube.row, octant), 0, numbers.size()};
-  if (out.exists) out.row = levels.child(depth, cube.row, octant);
-  const uint32_t count = out.exists ? labels.count(depth + 1, out.row) : 1;
-  const uint16_t* const of_octant = labels.labels_of_octant(depth, cube.row, octant);
-  for (uint32_t c = 0; c < count; ++c) {
-    const uint16_t label = of_octant[c];
-    numbers.push_back(label == SpaceLabels::kClosed ? closed : numbers[cube.first + label]);
-  }
-  return out;
-}
-
 // Computes the labels, level by level from the bricks upwards.
 class SpaceLabeler {
  public:

@@ -100,7 +100,19 @@ struct LabeledCube {
 
 // Returns octant `octant` of a cube. Appends the numbers of the octant's components to `numbers`,
 // which has the numbers of the cube's components; closed components get the number `closed`.
-LabeledCube octant_of(const SpaceLabels& labels, int depth, const LabeledCube& cube, int octant,
-                      uint32_t closed, std::vector<uint32_t>& numbers);
+inline LabeledCube octant_of(const SpaceLabels& labels, int depth, const LabeledCube& cube,
+                             int octant, uint32_t closed, std::vector<uint32_t>& numbers) {
+  const NodeLevels& levels = labels.levels();
+  LabeledCube out{levels.has_child(depth, cube.row, octant), 0, numbers.size()};
+  if (out.exists) out.row = levels.child(depth, cube.row, octant);
+  const uint32_t count = out.exists ? labels.count(depth + 1, out.row) : 1;
+  const uint16_t* const of_octant = labels.labels_of_octant(depth, cube.row, octant);
+  numbers.resize(out.first + count);
+  const uint32_t* const of_cube = numbers.data() + cube.first;
+  uint32_t* const appended = numbers.data() + out.first;
+  for (uint32_t c = 0; c < count; ++c)
+    appended[c] = of_octant[c] == SpaceLabels::kClosed ? closed : of_cube[of_octant[c]];
+  return out;
+}
 
 }  // namespace voxdag
