@@ -20,7 +20,7 @@ import unittest
 from pathlib import Path
 
 from cutout_scene import write_cutouts
-from slurm_cluster import SlurmCluster, missing_programs
+from slurm_cluster import SlurmCluster, missing_programs, running_tasks
 from voxdag_service import Service
 
 VOXDAG = ""
@@ -126,19 +126,7 @@ class ClusterTest(unittest.TestCase):
 
     def tasks(self):
         """Returns the process ids of the running tasks by node."""
-        found = {}
-        for entry in Path("/proc").iterdir():
-            try:
-                command = (entry / "cmdline").read_bytes().split(b"\0")
-                if b"build-batch" not in command or str(self.work).encode() not in command:
-                    continue
-                environment = (entry / "environ").read_bytes().split(b"\0")
-            except OSError:
-                continue
-            for variable in environment:
-                if variable.startswith(b"SLURMD_NODENAME="):
-                    found.setdefault(variable.split(b"=")[1].decode(), []).append(int(entry.name))
-        return found
+        return running_tasks(self.work)
 
     def a_task(self):
         tasks = self.wait_for(self.tasks, "running task")
@@ -152,28 +140,35 @@ class ClusterTest(unittest.TestCase):
                 self.assertEqual(report["cluster"]["failed_attempts"], 0)
                 self.assertLess(report["cluster"]["rows_after"], report["cluster"]["rows_before"])
 
+    def build_in_small_cubes(self, tasks, geometry, *options):
+        build = self.start(512, tasks, "--subvolume", "64", *geometry, *options)
+        report, _ = self.finish(build, 512, *geometry)
+        self.assertEqual(report["cluster"]["batches"], tasks)
+        return report
+
     def test_same_colors_from_any_number_of_tasks(self):
         self.scene = self.folder / "colored.glb"
         subprocess.run([VOXDAG, "generate", "city", self.scene, "--triangles", "4000", "--colors"],
                        check=True, capture_output=True)
         # The process that merges also bakes the colors: this process, or a job of the cluster.
         for tasks, options in [(3, []), (16, ["--cluster-merge"])]:
-            with self.subTest(tasks=tasks):
-                build = self.start(512, tasks, "--color", "--subvolume", "64", *options)
-                report, _ = self.finish(build, 512, "--color")
-                self.assertEqual(report["cluster"]["batches"], tasks)
-                self.assertGreater(report["colors"]["cells"], 100000)
+            report = self.build_in_small_cubes(tasks, ["--color"], *options)
+            self.assertGreater(report["colors"]["cells"], 100000)
 
     def test_same_cutouts_from_any_number_of_tasks(self):
         self.scene = self.folder / "cutouts.gltf"
         write_cutouts(self.scene)
         self.assertNotEqual(self.sha256(512), self.sha256(512, "--cutouts", "skip"))
         # --color implies --cutouts skip.
-        for tasks, options in [(3, ["--cutouts", "skip"]), (4, ["--color"])]:
-            with self.subTest(tasks=tasks):
-                build = self.start(512, tasks, "--subvolume", "64", *options)
-                report, _ = self.finish(build, 512, *options)
-                self.assertEqual(report["cluster"]["batches"], tasks)
+        for tasks, geometry in [(3, ["--cutouts", "skip"]), (4, ["--color"])]:
+            self.build_in_small_cubes(tasks, geometry)
+
+    def test_same_solids_from_any_number_of_tasks(self):
+        # Tasks fill by winding. The process that merges fills enclosed solids.
+        for tasks, rule, options in [(1, "winding", []), (7, "winding", ["--cluster-merge"]),
+                                     (5, "enclosed", [])]:
+            report = self.build_in_small_cubes(tasks, ["--solid", rule], *options)
+            self.assertGreater(report["solid"]["interior"], 100000)
 
     def test_more_batches_than_an_array_holds(self):
         report, _ = self.finish(self.start(2048, 120, "--subvolume", "128"), 2048)

@@ -30,6 +30,23 @@ def free_ports(count):
     return ports
 
 
+def running_tasks(work):
+    """Returns, by node, the process ids of the running tasks that build in the folder `work`."""
+    found = {}
+    for entry in Path("/proc").iterdir():
+        try:
+            command = (entry / "cmdline").read_bytes().split(b"\0")
+            if b"build-batch" not in command or str(work).encode() not in command:
+                continue
+            environment = (entry / "environ").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        for variable in environment:
+            if variable.startswith(b"SLURMD_NODENAME="):
+                found.setdefault(variable.split(b"=")[1].decode(), []).append(int(entry.name))
+    return found
+
+
 class SlurmCluster:
     """A cluster of `nodes` nodes with `cpus` CPUs each, all of them on this machine."""
 
