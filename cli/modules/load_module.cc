@@ -36,8 +36,8 @@ const void* load_module(const std::string& name) {
                                     (head ? std::string("voxdag ") + head->version
                                           : std::string("another program")) +
                                     ", expected the file of voxdag " VOXDAG_VERSION);
-  // The module then spells options as this program does.
-  head->set_option_speller(&option_text);
+  // The messages of the module then have the same words as the messages of this program.
+  head->set_audience(audience());
   return table;
 }
 

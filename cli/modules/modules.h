@@ -17,8 +17,8 @@ namespace voxdag::cli {
 // The first member of each table.
 struct ModuleHead {
   const char* version = VOXDAG_VERSION;
-  // A module has its own copy of the static libraries, and therefore its own speller of options.
-  void (*set_option_speller)(OptionSpeller) = &voxdag::set_option_speller;
+  // A module has its own copy of the static libraries, and therefore its own audience.
+  void (*set_audience)(const Audience&) = &voxdag::set_audience;
 };
 
 struct VdbModule {
