@@ -1,5 +1,8 @@
 #include "cli/modules/load_module.h"
 
+// These functions are hidden, because otherwise the module would use them instead of its own.
+#pragma GCC visibility push(hidden)
+
 namespace voxdag {
 
 std::unique_ptr<ImageReader> open_avif(std::unique_ptr<PeekedSource> source, MemoryBudget& budget) {
@@ -8,3 +11,5 @@ std::unique_ptr<ImageReader> open_avif(std::unique_ptr<PeekedSource> source, Mem
 }
 
 }  // namespace voxdag
+
+#pragma GCC visibility pop

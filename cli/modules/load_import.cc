@@ -1,5 +1,8 @@
 #include "cli/modules/load_module.h"
 
+// These functions are hidden, because otherwise the module would use them instead of its own.
+#pragma GCC visibility push(hidden)
+
 namespace voxdag {
 namespace {
 
@@ -19,3 +22,5 @@ ImportReport import_scene(FileSystem& files, const std::string& input, const std
 bool is_imported_scene(const ReadableFile& file) { return module().is_imported_scene(file); }
 
 }  // namespace voxdag
+
+#pragma GCC visibility pop

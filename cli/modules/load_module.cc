@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <filesystem>
 #include <string_view>
 
 #include "core/base/error.h"
@@ -9,35 +10,35 @@
 namespace voxdag::cli {
 namespace {
 
-// Folders of the modules, relative to the program's folder: in a build folder and as installed.
-// dlopen() replaces "$ORIGIN" by the program's folder. A RUNPATH would need no such names, but the
-// program would start later, because it would look for every library in these folders first.
+namespace fs = std::filesystem;
+
+// The folders of modules, relative to the program's folder: in a build folder, and as installed.
 constexpr const char* kFolders[] = {"lib/voxdag", VOXDAG_INSTALLED_MODULES};
+
+// Returns the path of a module. Throws Error{kInvalidInput} if there is no such file.
+std::string find_module(const std::string& file) {
+  const fs::path program = fs::read_symlink("/proc/self/exe").parent_path();
+  for (const char* folder : kFolders)
+    if (fs::path path = program / folder / file; fs::exists(path)) return path;
+  throw Error(ErrorCode::kInvalidInput,
+              "the installation of voxdag is incomplete: expected the file " +
+                  (program / kFolders[1] / file).lexically_normal().string());
+}
 
 }  // namespace
 
 const void* load_module(const std::string& name) {
-  const std::string file = "voxdag-" + name + ".so";
-  void* library = nullptr;
-  std::string problem;
-  for (const char* folder : kFolders) {
-    library = dlopen((std::string("$ORIGIN/") + folder + "/" + file).c_str(), RTLD_NOW);
-    if (library) break;
-    problem = dlerror();
-  }
+  const std::string path = find_module("voxdag-" + name + ".so");
+  void* const library = dlopen(path.c_str(), RTLD_NOW);
   if (!library)
-    throw Error(ErrorCode::kIo,
-                "cannot load a part of voxdag: " + problem + ", expected " + file +
-                    " from the same installation as the program, and the libraries that it uses");
+    throw Error(ErrorCode::kInvalidInput,
+                "cannot load a part of voxdag: " + std::string(dlerror()) +
+                    "; expected all libraries that it needs");
   const void* const table = dlsym(library, ("voxdag_" + name + "_module").c_str());
-  const auto* const head = static_cast<const ModuleHead*>(table);
-  if (!head || head->version != std::string_view(VOXDAG_VERSION))
-    throw Error(ErrorCode::kIo, file + " belongs to " +
-                                    (head ? std::string("voxdag ") + head->version
-                                          : std::string("another program")) +
-                                    ", expected the file of voxdag " VOXDAG_VERSION);
-  // The messages of the module then have the same words as the messages of this program.
-  head->set_audience(audience());
+  const char* const version = table ? static_cast<const ModuleHead*>(table)->version : "unknown";
+  if (version != std::string_view(VOXDAG_VERSION))
+    throw Error(ErrorCode::kInvalidInput, path + " has the version " + version +
+                                              ": expected the program's version, " VOXDAG_VERSION);
   return table;
 }
 

@@ -9,7 +9,7 @@ namespace voxdag::cli {
 
 // Loads the library "voxdag-<name>.so" from the folder of modules. Returns the address of its table
 // "voxdag_<name>_module", which begins with a ModuleHead. The library remains loaded. Throws
-// Error{kIo} if the library cannot be loaded, or if it belongs to another version of voxdag.
+// Error{kInvalidInput} if the library cannot be loaded, or if it has another version.
 const void* load_module(const std::string& name);
 
 template <class Table>

@@ -1,5 +1,8 @@
 #include "cli/modules/load_module.h"
 
+// These functions are hidden, because otherwise the module would use them instead of its own.
+#pragma GCC visibility push(hidden)
+
 namespace voxdag::query {
 namespace {
 
@@ -14,3 +17,5 @@ ExportReport write_vdb(const ExportJob& job) { return module().write_vdb(job); }
 ExportReport write_nvdb(const ExportJob& job) { return module().write_nvdb(job); }
 
 }  // namespace voxdag::query
+
+#pragma GCC visibility pop

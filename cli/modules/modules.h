@@ -1,13 +1,17 @@
 // A module is a library that the program loads when a command needs it. Modules contain the code
-// for libraries that take long to load, because they have many relocations or dependencies. Each
-// module consists of one of the files *_module.cc and of static libraries of voxdag. It defines one
-// symbol: the table of its functions.
+// that uses certain other libraries. These libraries take long to load, because they have many
+// relocations or dependencies. Each module consists of one of the files *_module.cc and of static
+// libraries of voxdag.
 //
-// The program links none of these static libraries. The files load_*.cc define their functions
-// instead, and call the functions of the tables. Tests and the Python module link the libraries.
+// The program is not linked with the code in modules. The files load_*.cc define its functions
+// instead. They call the functions in the module's table. Tests and the Python module are linked
+// with the code.
+//
+// If the program and a module contain the same function, the module also uses the program's
+// function (visible.map). So the two share all state, such as the list of temporary files that a
+// signal removes.
 #pragma once
 
-#include "core/base/options/option_text.h"
 #include "core/image/readers.h"
 #include "query/export/export_job.h"
 #include "scene/import/import.h"
@@ -17,8 +21,6 @@ namespace voxdag::cli {
 // The first member of each table.
 struct ModuleHead {
   const char* version = VOXDAG_VERSION;
-  // A module has its own copy of the static libraries, and therefore its own audience.
-  void (*set_audience)(const Audience&) = &voxdag::set_audience;
 };
 
 struct VdbModule {

@@ -49,13 +49,39 @@ TEST_F(Modules, AMissingModuleIsNamed) {
   EXPECT_EQ(output_of(in_folder + "./voxdag --version"), run({"--version"}).out);
 #ifdef VOXDAG_HAS_VDB
   const std::string error = output_of(
-      in_folder + "./voxdag export m.vdag --to nvdb -o m.nvdb --quiet 2>&1 || test $? = 6");
-  for (const char* part : {"cannot load a part of voxdag", "voxdag-vdb.so", "same installation"})
+      in_folder + "./voxdag export m.vdag --to nvdb -o m.nvdb --quiet 2>&1 || test $? = 2");
+  for (const char* part : {"incomplete: expected the file", "voxdag-vdb.so"})
     EXPECT_NE(error.find(part), std::string::npos) << error;
   EXPECT_FALSE(exists("m.nvdb"));
   EXPECT_FALSE(exists("m.nvdb.partial"));
+  // A file that is no library.
+  std::filesystem::create_directories(folder_.file("lib/voxdag"));
+  put("lib/voxdag/voxdag-vdb.so", "text");
+  EXPECT_NE(output_of(in_folder + "./voxdag export m.vdag --to vdb -o m.vdb 2>&1 || test $? = 2")
+                .find("cannot load a part of voxdag: "),
+            std::string::npos);
 #endif
 }
+
+#ifdef VOXDAG_HAS_VDB
+// The list of temporary files, the damage of mapped files and the spelling of options must exist
+// once in a process. So a module uses the program's functions for them.
+TEST_F(Modules, UseTheStateOfTheProgram) {
+  make_scene();
+  ASSERT_EQ(run({"build", "m.glb", "-r", "64", "-o", "m.vdag"}).status, 0);
+  const std::string bindings =
+      output_of("cd '" + folder_.path() +
+                "' && LD_DEBUG=bindings '" VOXDAG_BINARY
+                "' export m.vdag --to vdb -o m.vdb 2>&1 | grep 'file [^ ]*voxdag-vdb.so'");
+  for (const char* name : {"13TemporaryPathC", "14WatchedMapping10is_damaged", "11option_text"}) {
+    const size_t at = bindings.find(name);
+    ASSERT_NE(at, std::string::npos) << name;
+    const size_t line = bindings.rfind('\n', at) + 1;
+    EXPECT_NE(bindings.substr(line, at - line).find("to " VOXDAG_BINARY " "), std::string::npos)
+        << bindings.substr(line, at - line);
+  }
+}
+#endif
 
 }  // namespace
 }  // namespace command_line
