@@ -69,7 +69,7 @@ void watch_output() {
 
 // Flushes standard output. Throws if the buffered text cannot be written, so that the command
 // fails. If its reader has closed the pipe, as `head` does after the first lines, ends the process
-// without a message: the reader has what it needs.
+// without a message, because the reader needs no more.
 void check_output() {
   const bool is_flushed = std::fflush(stdout) == 0 && !std::ferror(stdout);
   if (is_flushed && !g_output_errno) return;

@@ -5,6 +5,7 @@
 #include <embree3/rtcore.h>
 
 #include <atomic>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 
@@ -120,7 +121,7 @@ Timing cast_singly(RTCScene scene, const RaySet& rays, RTCIntersectContextFlags 
   });
 }
 
-// The number of rays is a multiple of kWide, because a packet is a part of a tile of the picture.
+// Does not cast the rays that remain after the last complete packet, at most kWide - 1.
 Timing cast_packets(RTCScene scene, const RaySet& rays, RTCIntersectContextFlags flags, bool any) {
   alignas(32) static const int valid[kWide] = {-1, -1, -1, -1, -1, -1, -1, -1};
   return best_of_three(rays.origins.size(), [&] {

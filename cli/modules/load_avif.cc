@@ -1,6 +1,6 @@
 #include "cli/modules/load_module.h"
 
-// These functions are hidden, because otherwise the module would use them instead of its own.
+// Hides these functions from the module, which has functions of the same names.
 #pragma GCC visibility push(hidden)
 
 namespace voxdag {

@@ -159,7 +159,8 @@ void for_each_batch(size_t count, const Work& work) {
 }
 
 // Divides rays into batches. Calls cast(first, origins, directions) for each of them, with the
-// index of its first ray.
+// index of its first ray. The errors of cast() count the rays from the batch's first ray, so their
+// messages get the index of this ray.
 template <class Cast>
 void for_each_ray_batch(const voxdag_ray* rays, size_t count, const Cast& cast) {
   std::vector<voxdag::query::Coordinates> origins(std::min(count, kBatch)), directions(origins);
@@ -168,8 +169,14 @@ void for_each_ray_batch(const voxdag_ray* rays, size_t count, const Cast& cast) 
       std::copy_n(rays[first + i].origin, 3, origins[i].begin());
       std::copy_n(rays[first + i].direction, 3, directions[i].begin());
     }
-    cast(first, std::span<const voxdag::query::Coordinates>(origins).first(some),
-         std::span<const voxdag::query::Coordinates>(directions).first(some));
+    try {
+      cast(first, std::span<const voxdag::query::Coordinates>(origins).first(some),
+           std::span<const voxdag::query::Coordinates>(directions).first(some));
+    } catch (const voxdag::Error& error) {
+      if (first == 0) throw;
+      throw voxdag::Error(error.code(),
+                          "counted from ray " + std::to_string(first) + ": " + error.message());
+    }
   });
 }
 

@@ -138,7 +138,7 @@ std::unique_ptr<WordQueue> FirstParentOrder::write_in_windows(uint32_t level,
     });
   };
   for_each_pointer([&](uint64_t child) { below.request(child); });
-  below.find_first();
+  below.find_first(cancel_);
   for_each_pointer([&](uint64_t child) {
     const std::span<const uint32_t> words = below.first_to(child);
     if (!words.empty()) below.place(child, place(level + 1, words, *next));

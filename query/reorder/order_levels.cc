@@ -13,7 +13,7 @@ namespace voxdag::query {
 namespace {
 
 // Divisors of the memory limit, for the memory of one list, of one sorter, of the new offsets of a
-// level, and of one window of lookups (node_values.h). Up to three sorters, or three kinds of lists
+// level, and of one window of lookups (node_values.h). Up to three sorters, or four kinds of lists
 // of windows (windowed_level.h), exist at the same time.
 constexpr uint64_t kListShare = 1024;
 constexpr uint64_t kSorterShare = 8;

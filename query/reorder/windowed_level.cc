@@ -8,9 +8,10 @@
 namespace voxdag::query {
 namespace {
 
-// The memory for one word of a window is the word and, in find_first(), a bit that tells whether a
-// requested node begins there, or, in resolve(), half of a new offset.
+// Memory for one word of a window. find_first() needs the word, and a bit that is set if a
+// requested node begins there. resolve() needs half of a new offset.
 constexpr uint64_t kBytesOfWord = 5;
+constexpr uint64_t kItemsPerCheck = uint64_t{1} << 16;  // between two checks of the cancel token
 constexpr uint64_t kMinWindowWords = 64, kMaxWindowWords = uint64_t{1} << 31;
 
 }  // namespace
@@ -49,12 +50,12 @@ uint64_t WindowedLevel::node_words(uint64_t offset, uint32_t first_word) const {
   return count;
 }
 
-void WindowedLevel::find_first() {
+void WindowedLevel::find_first(const CancelToken& cancel) {
   requests_->finish();
   sizes_ = make_lists<uint32_t>();
   nodes_ = make_lists<uint32_t>();
   uint64_t node = 0;
-  for (size_t window = 0; window < windows_; ++window) find_first(window, node);
+  for (size_t window = 0; window < windows_; ++window) find_first(window, node, cancel);
   sizes_->finish();
   nodes_->finish();
   placed_ = make_lists<uint64_t>();
@@ -62,17 +63,20 @@ void WindowedLevel::find_first() {
 
 // Reads the requests of a window. `node` is the offset of the first node that begins in the window,
 // and receives the offset of the first node that begins after it.
-void WindowedLevel::find_first(size_t window, uint64_t& node) {
+void WindowedLevel::find_first(size_t window, uint64_t& node, const CancelToken& cancel) {
   constexpr uint64_t kChunkWords = uint64_t{1} << 16;
   const uint64_t begin = uint64_t{window} << window_shift_;
   const uint64_t end = std::min(begin + (uint64_t{1} << window_shift_), words_);
   const uint64_t loaded = std::min(end + global_layout::kMaxNodeWords, words_) - begin;
   PageBuffer<uint32_t> words(space_.budget, loaded, "nodes of a level");
   PageBuffer<uint64_t> requested(space_.budget, (end - begin) / 64 + 1, "nodes of a level");
-  for (uint64_t first = 0; first < loaded; first += kChunkWords)
+  for (uint64_t first = 0; first < loaded; first += kChunkWords) {
+    cancel.check();
     std::ranges::copy(input_.words(level_, begin + first, std::min(kChunkWords, loaded - first)),
                       words.data() + first);
+  }
   for (uint64_t left = requests_->size(window); left > 0; --left) {
+    if (left % kItemsPerCheck == 0) cancel.check();
     const uint64_t at = requests_->next(window), bit = uint64_t{1} << at % 64;
     if (requested[at / 64] & bit) {
       sizes_->add(window, 0);
@@ -84,6 +88,7 @@ void WindowedLevel::find_first(size_t window, uint64_t& node) {
     for (uint64_t i = 0; i < count; ++i) nodes_->add(window, words[at + i]);
   }
   requests_->rewind(window);
+  cancel.check();
   for (; node < end; node += node_words(node, words[node - begin])) {
     uint64_t& bits = requested[(node - begin) / 64];
     const uint64_t bit = uint64_t{1} << (node - begin) % 64;
@@ -115,6 +120,7 @@ void WindowedLevel::resolve(const CancelToken& cancel) {
     // The slot has 1 plus the new offset, or 0 before the first request.
     PageBuffer<uint64_t> placed(space_.budget, slots, "offsets of a level");
     for (uint64_t left = requests_->size(window); left > 0; --left) {
+      if (left % kItemsPerCheck == 0) cancel.check();
       uint64_t& slot = placed[requests_->next(window) / 2];
       if (slot == 0) slot = placed_->next(window) + 1;
       answers_->add(window, slot - 1);

@@ -1,6 +1,6 @@
 // A level that does not fit in memory, for the order by first parent (first_parent.h). The level is
-// divided into *windows* that fit in memory, ranges of word offsets in the input file. Every
-// pointer into the level has three passes, always in the order of the output file:
+// divided into *windows* that fit in memory, ranges of word offsets in the input file. The
+// caller goes through all pointers into the level three times, in the order of the output file:
 //
 //   1. request() adds the pointer to the requests of its window. find_first() then loads one window
 //      after the other, and finds the first pointer to each node.
@@ -9,7 +9,7 @@
 //      windows again, and finds the new offset for each request.
 //   3. offset_of() returns the new offset of the node.
 //
-// All data that passes between these functions is in scratch files: for each window, there are
+// These functions exchange their data through scratch files: for each window, there are
 // lists in which the items have the order of the pointers. So nothing is sorted.
 #pragma once
 
@@ -27,14 +27,14 @@ namespace voxdag::query {
 class WindowedLevel {
  public:
   // `window_bytes` is the memory of a window, and `list_bytes` the approximate memory for the
-  // buffers of the lists of one kind. Up to three kinds exist at the same time.
+  // buffers of the lists of one kind. Up to four kinds exist at the same time.
   WindowedLevel(DagInput& input, uint32_t level, const SpillSpace& space, uint64_t window_bytes,
                 uint64_t list_bytes);
 
   // Throw Error{kCorrupt} if the pointer does not refer to a node of the level. find_first() also
   // throws it if a node of the level was not requested.
   void request(uint64_t offset);
-  void find_first();
+  void find_first(const CancelToken& cancel);
   // Returns no words if the pointer is not the first one to its node. The result is valid until the
   // next call.
   std::span<const uint32_t> first_to(uint64_t offset);
@@ -53,7 +53,7 @@ class WindowedLevel {
     return std::make_unique<SpillBuckets<T>>(space_, windows_, list_bytes_);
   }
   uint64_t node_words(uint64_t offset, uint32_t first_word) const;
-  void find_first(size_t window, uint64_t& node);
+  void find_first(size_t window, uint64_t& node, const CancelToken& cancel);
   [[noreturn]] void no_node(uint64_t offset) const;
 
   DagInput& input_;

@@ -37,12 +37,10 @@ std::string spell_as_keyword(std::string_view name, std::string_view value) {
 
 void set_audience(const Audience& audience) { g_audience = &audience; }
 
-const Audience& audience() { return *g_audience.load(); }
-
 std::string option_text(std::string_view name, std::string_view value) {
-  return audience().spell_option(name, value);
+  return g_audience.load()->spell_option(name, value);
 }
 
-std::string repeat_text() { return audience().repeat; }
+std::string repeat_text() { return g_audience.load()->repeat; }
 
 }  // namespace voxdag

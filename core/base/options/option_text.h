@@ -33,8 +33,6 @@ inline constexpr Audience kPythonUsers{&spell_as_keyword, "make the same call ag
 // Sets the audience of this process, which is kCommandLineUsers by default. `audience` must remain
 // valid until the process ends. Call it before the process starts threads.
 void set_audience(const Audience& audience);
-// Returns the audience of this process.
-const Audience& audience();
 
 // Returns the option as the users of this process write it, or "" if they cannot set it.
 std::string option_text(std::string_view name, std::string_view value = {});
