@@ -309,8 +309,7 @@ TEST_F(Package, ReadsManyPagesInLittleMemory) {
   HostilePackage{.pages = kPages}.write(path("p"));
   const uint64_t before = resident_bytes();
   const PackageReader package(system_files(), path("p"));
-  // The limit is half of the places' size, because the kernel's figure can be off by many MiB.
-  EXPECT_LT(resident_bytes(), before + (uint64_t{125} << 20));
+  EXPECT_LT(resident_bytes(), before + (uint64_t{32} << 20));
   EXPECT_EQ(error_of([&] { package.tile(0, kPages * kPageBlocks * kBlockTiles - 1); }).code(),
             ErrorCode::kNotFound);  // the pack
 }
