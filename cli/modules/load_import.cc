@@ -4,22 +4,17 @@
 #pragma GCC visibility push(hidden)
 
 namespace voxdag {
-namespace {
-
-const cli::ImportModule& module() {
-  static const auto& table = cli::module_table<cli::ImportModule>("import");
-  return table;
-}
-
-}  // namespace
 
 ImportReport import_scene(FileSystem& files, const std::string& input, const std::string& output,
                           uint64_t memory_bytes, const std::function<void(const Warning&)>& warn,
                           Progress& progress, const CancelToken& cancel) {
-  return module().import_scene(files, input, output, memory_bytes, warn, progress, cancel);
+  return cli::module<cli::ImportModule>().import_scene(files, input, output, memory_bytes, warn,
+                                                       progress, cancel);
 }
 
-bool is_imported_scene(const ReadableFile& file) { return module().is_imported_scene(file); }
+bool is_imported_scene(const ReadableFile& file) {
+  return cli::module<cli::ImportModule>().is_imported_scene(file);
+}
 
 }  // namespace voxdag
 

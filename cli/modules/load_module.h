@@ -12,9 +12,11 @@ namespace voxdag::cli {
 // Error{kInvalidInput} if the library cannot be loaded, or if it has another version.
 const void* load_module(const std::string& name);
 
+// Returns a module's table. Loads the module at the first call.
 template <class Table>
-const Table& module_table(const char* name) {
-  return *static_cast<const Table*>(load_module(name));
+const Table& module() {
+  static const auto& table = *static_cast<const Table*>(load_module(Table::kName));
+  return table;
 }
 
 }  // namespace voxdag::cli

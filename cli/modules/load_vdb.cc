@@ -4,17 +4,13 @@
 #pragma GCC visibility push(hidden)
 
 namespace voxdag::query {
-namespace {
 
-const cli::VdbModule& module() {
-  static const auto& table = cli::module_table<cli::VdbModule>("vdb");
-  return table;
+ExportReport write_vdb(const ExportJob& job) {
+  return cli::module<cli::VdbModule>().write_vdb(job);
 }
-
-}  // namespace
-
-ExportReport write_vdb(const ExportJob& job) { return module().write_vdb(job); }
-ExportReport write_nvdb(const ExportJob& job) { return module().write_nvdb(job); }
+ExportReport write_nvdb(const ExportJob& job) {
+  return cli::module<cli::VdbModule>().write_nvdb(job);
+}
 
 }  // namespace voxdag::query
 

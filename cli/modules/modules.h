@@ -24,17 +24,20 @@ struct ModuleHead {
 };
 
 struct VdbModule {
+  static constexpr const char* kName = "vdb";
   ModuleHead head;
   decltype(&query::write_vdb) write_vdb;
   decltype(&query::write_nvdb) write_nvdb;
 };
 
 struct AvifModule {
+  static constexpr const char* kName = "avif";
   ModuleHead head;
   decltype(&voxdag::open_avif) open_avif;
 };
 
 struct ImportModule {
+  static constexpr const char* kName = "import";
   ModuleHead head;
   decltype(&voxdag::import_scene) import_scene;
   decltype(&voxdag::is_imported_scene) is_imported_scene;

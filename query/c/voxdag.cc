@@ -159,8 +159,8 @@ void for_each_batch(size_t count, const Work& work) {
 }
 
 // Divides rays into batches. Calls cast(first, origins, directions) for each of them, with the
-// index of its first ray. The errors of cast() count the rays from the batch's first ray, so their
-// messages get the index of this ray.
+// index of its first ray. The messages of cast() count the rays from this one, so they also get its
+// index.
 template <class Cast>
 void for_each_ray_batch(const voxdag_ray* rays, size_t count, const Cast& cast) {
   std::vector<voxdag::query::Coordinates> origins(std::min(count, kBatch)), directions(origins);
@@ -174,8 +174,8 @@ void for_each_ray_batch(const voxdag_ray* rays, size_t count, const Cast& cast) 
            std::span<const voxdag::query::Coordinates>(directions).first(some));
     } catch (const voxdag::Error& error) {
       if (first == 0) throw;
-      throw voxdag::Error(error.code(),
-                          "counted from ray " + std::to_string(first) + ": " + error.message());
+      throw voxdag::Error(error.code(), error.message() + "; rays[0] in this message is ray " +
+                                            std::to_string(first) + " of the call");
     }
   });
 }

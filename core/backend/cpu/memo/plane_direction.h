@@ -24,22 +24,22 @@ class PlaneDirection {
            inner_ == inner;
   }
 
-  // A plane of this direction. Its offset can be any.
+  // Returns a plane of this direction, with an arbitrary offset.
   const Plane& plane() const { return plane_; }
   // Returns the values of n.k for the 512 voxels k of a cube of 8^3, in Morton order, where n is
   // the direction. The same values, multiplied by 2^s, are n.k for the low corners k of smaller
   // cubes in a cube. The edge of the smaller cubes is 2^s voxels.
   const int64_t* offsets() const { return offsets_; }
 
-  // A node of 8^3 voxels, for an offset as in PlaneNodes::at().
   const SmallPlaneNodes& small() const { return small_; }
+  // Returns the node of a cube of 8^3 voxels, as PlaneNodes::at() does. Makes it if necessary.
   const PlaneNode& small_node(int64_t f, SubDagTables& tables, const Kernels& kernels) {
     PlaneNode& node = small_.at(f);
     if (node.nodes == 0) make(f, tables, kernels, node);
     return node;
   }
 
-  // The nodes of 16^3 voxels; null if they were not set_large().
+  // Returns the nodes of 16^3 voxels; null before set_large().
   LargePlaneNodes* large() const { return large_; }
   void set_large(LargePlaneNodes* large) { large_ = large; }
   // Counts a tile of this direction. Returns the number of tiles so far.

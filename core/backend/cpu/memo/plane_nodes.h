@@ -18,14 +18,13 @@
 
 namespace voxdag::cpu {
 
-// A node on a plane. The numbers are those of its voxels, of the voxels that only an inner side
-// sets (`filled`), and of its octree nodes.
+// A node on a plane.
 struct PlaneNode {
   uint64_t hash = 0;
   uint32_t id = 0;
   uint32_t voxels : 13 = 0;
-  uint32_t filled : 12 = 0;
-  uint32_t nodes : 7 = 0;  // 0: the node is not made yet
+  uint32_t filled : 12 = 0;  // number of voxels that only an inner side sets
+  uint32_t nodes : 7 = 0;    // number of octree nodes; 0: the node is not made yet
 
   PlaneNode() = default;
   // A node of at most 16^3 voxels, with the counts of its subtree.

@@ -135,6 +135,13 @@ TEST_F(CApiTest, Rays) {
       EXPECT_EQ(hits[i].normal[axis], axis == hit.axis ? hit.sign : 0);
   }
   EXPECT_GT(found, 100u);
+  // A message names the ray, also behind the first batch of 4096 rays.
+  rays[4500].direction[0] = NAN;
+  EXPECT_EQ(voxdag_occluded(file_, rays.data(), rays.size(), nullptr, occluded.data()),
+            VOXDAG_INVALID_INPUT);
+  const std::string error = voxdag_error();
+  EXPECT_NE(error.find("rays[404] has the origin"), std::string::npos) << error;
+  EXPECT_NE(error.find("rays[0] in this message is ray 4096"), std::string::npos) << error;
 }
 
 TEST_F(CApiTest, Nearest) {
