@@ -133,7 +133,7 @@ TEST_P(Solids, EqualTheOracleIfViewsDifferAlongAPlane) {
 }
 
 // Adds a box whose faces point outward.
-void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, int64_t edge) {
+void add_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, int64_t edge) {
   const auto corner = [&](int c) {
     oracle::Point p{};
     for (int a = 0; a < 3; ++a) p[a] = low[a] + (c >> a & 1) * edge;
@@ -147,6 +147,25 @@ void add_small_box(oracle::Triangles& out, const std::array<int64_t, 3>& low, in
   }
 }
 
+// The voxels equal the oracle's if several faces are in one plane and overlap. Faces of the boxes
+// cover cubes, so that the backend can find the cubes' nodes by their plane.
+TEST_P(Solids, EqualTheOracleWithCoplanarFaces) {
+  const auto backend = open();
+  constexpr int64_t kEdge = 60 * 256, kLow = 5 * 256 + 77;
+  using Lows = std::vector<std::array<int64_t, 3>>;
+  for (const Lows& lows : {Lows{{kLow, kLow, kLow}, {kLow, kLow, kLow}},
+                           Lows{{kLow, kLow, kLow}, {kLow + kEdge, kLow + 4000, kLow + 2048}},
+                           Lows{{kLow, kLow, kLow}, {kLow, kLow + 9000, kLow}, {kLow, 777, kLow}}})
+    for (const SolidRule rule : kRules) {
+      SCOPED_TRACE(testing::Message()
+                   << lows.size() << " boxes, the second one at " << lows[1][0] << ' ' << lows[1][1]
+                   << ' ' << lows[1][2] << ", rule " << (int)rule);
+      oracle::Triangles scene;
+      for (const auto& low : lows) add_box(scene, low, kEdge);
+      expect_solid(*backend, scene, 7, rule);
+    }
+}
+
 // The voxels equal the oracle's if very many components (6-connected sets of empty voxels in a
 // block) contain no voxel at a corner of their block. The backend collects such components, and
 // here it must decide them in several batches. Some of them are in the same block.
@@ -156,7 +175,7 @@ TEST_P(Solids, EqualTheOracleWithManyComponents) {
   for (int64_t x = 0; x < 8; ++x)
     for (int64_t y = 0; y < 8; ++y)
       for (int64_t z = 0; z < 8; ++z)
-        add_small_box(scene, {1024 * x + 129, 1024 * y + 129, 1024 * z + 129}, 512);
+        add_box(scene, {1024 * x + 129, 1024 * y + 129, 1024 * z + 129}, 512);
   for (const SolidRule rule : kRules) expect_solid(*backend, scene, 5, rule);
 }
 

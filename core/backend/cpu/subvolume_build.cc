@@ -91,11 +91,25 @@ void SubvolumeBuild::reserve_entries(size_t count) {
   if (count > entries_.size()) entries_.grow(memory_, count);
 }
 
+const Entry* SubvolumeBuild::covering(size_t first, size_t count) const {
+  if (count > kFewTriangles) return nullptr;
+  const Entry* const begin = &entries_[first];
+  const Entry* found = begin;
+  while (found != begin + count && !found->inside()) ++found;
+  if (found == begin + count) return nullptr;
+  for (const Entry* other = begin; other != begin + count; ++other)
+    if (other != found && (other->wide() || found->wide() ||
+                           !is_in_plane(triangles_.narrow(*other), triangles_.narrow(*found))))
+      return nullptr;
+  return found;
+}
+
 NodeRef SubvolumeBuild::build(int size_log2, const LatticeCube& cube, size_t first, size_t count) {
   if (count == 0) return {};
-  if (NodeRef node; count == 1 && entries_[first].inside() &&
-                    planes_.build(triangles_, entries_[first], cube, size_log2, node))
-    return node;
+  if (const Entry* const entry = covering(first, count)) {
+    NodeRef node;
+    if (planes_.build(triangles_, *entry, cube, size_log2, node)) return node;
+  }
   if (size_log2 <= kTileLog2 && !is_worth_splitting(size_log2, first, count))
     return build_tile(size_log2, cube, first, count);
   const size_t below = entries_used_;
@@ -177,8 +191,8 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid_part(int size_log2, const 
                                                            size_t first, size_t count) {
   if (count == 0) return {{}, true};
   SolidNode node;
-  if (count == 1 && entries_[first].inside() &&
-      build_solid_part_plane(size_log2, cube, entries_[first], node))
+  if (const Entry* const entry = covering(first, count);
+      entry != nullptr && build_solid_part_plane(size_log2, cube, *entry, node))
     return node;
   if (!is_worth_splitting(size_log2, first, count))
     return draw_solid_part(size_log2, cube, first, count);

@@ -32,6 +32,10 @@ class SubvolumeBuild {
  private:
   NodeRef build_streamed(TriangleStream& stream);
   void read(TriangleStream& stream);
+  // If a triangle of entries_[first, first + count) covers the cube of these entries, and all
+  // others are in its plane, returns the covering triangle: it sets all voxels that they set
+  // together. Otherwise returns null.
+  const Entry* covering(size_t first, size_t count) const;
   // Returns the node of a cube with an edge of 2^size_log2 voxels. The triangles that may touch the
   // cube are entries_[first, first + count).
   NodeRef build(int size_log2, const LatticeCube& cube, size_t first, size_t count);

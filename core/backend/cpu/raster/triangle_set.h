@@ -103,6 +103,9 @@ struct Entry {
   uint32_t number() const { return bits & (kWide - 1); }
 };
 
+// True if all vertices of `other` are in the plane of `t`. `t` must not be degenerate.
+bool is_in_plane(const NarrowTriangle& other, const NarrowTriangle& t);
+
 // The triangles of one subvolume. Not thread-safe. Throws OutOfBudget.
 class TriangleSet {
  public:
