@@ -8,6 +8,7 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "scheduler/replaced_result.h"
 #include "scheduler/run_build.h"
 #include "scheduler/spec/build_fields.h"
@@ -91,7 +92,7 @@ void run(const BuildCommand& command, CommandContext& context) {
     else if (builds.size() == 1)
       print_json_text(report_json(report));
     else
-      reports.push_back(nlohmann::ordered_json::parse(report_json(report)));
+      reports.push_back(parse_json<nlohmann::ordered_json>(report_json(report)));
   }
   if (!reports.empty()) print_json(nlohmann::ordered_json{{"builds", reports}});
 }

@@ -6,6 +6,7 @@
 #include "cli/selection_options.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
@@ -100,7 +101,7 @@ ordered_json info_json(const FileFacts& facts) {
 // Returns a JSON value as a field of a CSV line (RFC 4180). Quotes a string with a comma, a space
 // or a quote.
 std::string csv_field(const ordered_json& value) {
-  if (!value.is_string()) return value.dump();
+  if (!value.is_string()) return exact_json_text(value);
   std::string text;
   for (const char c : printable_line(value.get<std::string>()))
     text += c == '"' ? "\"\"" : std::string(1, c);

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "core/format/global/open_global.h"
 #include "core/io/overwrite.h"
 
@@ -15,7 +16,7 @@ constexpr int kIndent = 2, kOneLine = -1;
 
 template <class Json>
 void print_with_indent(const Json& json, int indent) {
-  print_json_text(json.dump(indent, ' ', false, Json::error_handler_t::replace));
+  print_json_text(json_text(json, indent));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/received_bytes.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag::client {
 namespace {
@@ -247,7 +248,7 @@ ErrorCode error_code_of(const std::string& name, int http_status) {
 
 void throw_if_problem(const ClientResponse& response) {
   if (response.status < 400) return;
-  const auto json = nlohmann::json::parse(response.body, nullptr, false);
+  const auto json = try_parse_json<nlohmann::json>(response.body);
   std::string code,
       detail = "the server answered with status " + std::to_string(response.status) +
                " and no description of the error, expected one as a voxdag service sends it";

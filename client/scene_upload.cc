@@ -7,6 +7,7 @@
 
 #include "client/retry_policy.h"
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 
 namespace voxdag::client {
@@ -75,7 +76,7 @@ class Upload {
     try {
       const ClientResponse answer =
           service_.send_with_retries([&](HttpClient& http) { return http.get(path_on_server()); });
-      const Json scene = Json::parse(answer.body);
+      const Json scene = parse_json<Json>(answer.body);
       if (scene.at("complete").get<bool>() && scene.at("sha256") == sha256_) return true;
       const std::string text = answer.header("Upload-Offset");
       uint64_t offset = 0;

@@ -2,6 +2,7 @@
 
 #include "client/retry_policy.h"
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "core/io/random_id.h"
 
 namespace voxdag::client {
@@ -11,11 +12,10 @@ constexpr double kPollIntervalS = 0.5;
 
 std::string text_of(const Json& body) {
   try {
-    return body.dump();
+    return exact_json_text(body);
   } catch (const Json::type_error&) {
     throw Error(ErrorCode::kInvalidInput,
-                "a name or path in the request " +
-                    body.dump(-1, ' ', true, Json::error_handler_t::replace).substr(0, 200) +
+                "a name or path in the request " + ascii_json_text(body).substr(0, 200) +
                     " is not UTF-8 (\\ufffd marks the place): expected UTF-8");
   }
 }
@@ -41,14 +41,14 @@ ClientResponse ServiceClient::send_with_retries(const Request& request) {
 }
 
 Json ServiceClient::get(const std::string& path) {
-  return Json::parse(send_with_retries([&](HttpClient& http) { return http.get(path); }).body);
+  return parse_json<Json>(send_with_retries([&](HttpClient& http) { return http.get(path); }).body);
 }
 
 Json ServiceClient::post(const std::string& path, const Json& body, const HeaderMap& headers) {
   const std::string text = body.is_null() ? "" : text_of(body);
-  return Json::parse(send_with_retries([&](HttpClient& http) {
-                       return http.send("POST", path, text, headers);
-                     }).body);
+  return parse_json<Json>(send_with_retries([&](HttpClient& http) {
+                            return http.send("POST", path, text, headers);
+                          }).body);
 }
 
 bool ServiceClient::remove(const std::string& path) {

@@ -8,6 +8,7 @@
 #include "core/base/options/option_text.h"
 #include "core/fields/field.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "core/format/global/open_global.h"
 #include "core/io/overwrite.h"
 #include "scheduler/spec/build_report.h"
@@ -47,8 +48,7 @@ std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions&
 // Returns names as the JSON of a report contains them: bytes that are not UTF-8 become U+FFFD.
 std::vector<std::string> as_reported(const std::vector<std::string>& names) {
   const FieldJson json = names;
-  const auto replace = FieldJson::error_handler_t::replace;
-  return FieldJson::parse(json.dump(-1, ' ', false, replace)).get<std::vector<std::string>>();
+  return parse_json<FieldJson>(json_text(json)).get<std::vector<std::string>>();
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "core/format/global/open_global.h"
 #include "query/package/package_reader.h"
 #include "query/package/write_package.h"
@@ -58,7 +59,7 @@ std::string manifest_of(const PublishCommand& command, const voxdag_reader::File
   auto manifest = server::file_manifest(file, query::DagView(file), "", cancel);
   manifest["tile_levels"] = query::kPackageTileLevels;
   manifest["name"] = title_of(command);
-  return manifest.dump();
+  return exact_json_text(manifest);
 }
 
 void print(const PublishCommand& command, const query::PackageReport& r, const RunTimes& times) {

@@ -5,6 +5,7 @@
 
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag::cli {
 namespace {
@@ -37,7 +38,7 @@ std::string state_line(const Json& job) {
   std::string line =
       "job " + printable_line(job.at("id").get<std::string>()) + ": " + printable_line(state);
   if (job.at("position").is_number())
-    line += ", number " + job.at("position").dump() + " in the queue";
+    line += ", number " + exact_json_text(job.at("position")) + " in the queue";
   if (state == "queued" && !error_code(job).empty())
     line += ", retry after " + printable_line(error_code(job));
   return line;
@@ -60,7 +61,7 @@ std::string progress_text(const Json& job) {
   if (state == "succeeded") return size_text(job.at("result").at("bytes"));
   if (state == "failed") return printable_line(error_code(job));
   if (state == "queued" && job.at("position").is_number())
-    return "number " + job.at("position").dump();
+    return "number " + exact_json_text(job.at("position"));
   if (!progress.is_object()) return "";
   const std::string stage = printable_line(progress.at("stage").get<std::string>());
   const std::string overall = overall_text(progress, state == "running");
@@ -74,7 +75,7 @@ void print_result(const Json& job) {
               size_text(r.at("bytes")).c_str(),
               printable_line(r.at("sha256").get<std::string>()).c_str());
   std::printf("  %s triangles in a grid of %s^3\n", count("triangles").c_str(),
-              job.at("resolution").dump().c_str());
+              exact_json_text(job.at("resolution")).c_str());
   std::printf("  %s voxels, %s octree nodes, %s DAG nodes\n", count("voxels").c_str(),
               count("svo_nodes").c_str(), count("dag_nodes").c_str());
   std::printf("  %s wall, %s CPU, peak memory %s\n", duration_text(r.at("wall_s")).c_str(),

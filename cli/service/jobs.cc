@@ -7,6 +7,7 @@
 #include "core/base/clock.h"
 #include "core/base/text/percent.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag::cli {
 namespace {
@@ -40,8 +41,9 @@ void print(const Json& answer) {
   for (const Json& job : answer.at("jobs"))
     print_row(printable_line(job.at("id").get<std::string>()),
               printable_line(job.at("state").get<std::string>()),
-              age_text(job.at("created_at").get<std::string>(), now_s), job.at("resolution").dump(),
-              progress_text(job), job_title(job) + labels_text(job));
+              age_text(job.at("created_at").get<std::string>(), now_s),
+              exact_json_text(job.at("resolution")), progress_text(job),
+              job_title(job) + labels_text(job));
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 

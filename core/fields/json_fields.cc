@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/fields/json_text.h"
+
 namespace voxdag::json_fields {
 
 namespace {
@@ -20,9 +22,7 @@ std::string shown(const FieldJson& json) {
          return item.is_structured() || item.is_string();
        })))
     return "an array of " + std::to_string(json.size()) + " items";
-  const auto text_of = [](const FieldJson& value) {
-    return value.dump(-1, ' ', true, FieldJson::error_handler_t::replace);
-  };
+  const auto text_of = [](const FieldJson& value) { return ascii_json_text(value); };
   if (!json.is_string()) return text_of(json);
   const auto& text = json.get_ref<const std::string&>();
   return text.size() <= kMaxShownBytes ? text_of(json)

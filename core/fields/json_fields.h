@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/fields/field.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag {
 
@@ -273,7 +274,7 @@ T record_from_json(const FieldJson& json) {
 template <class T>
 T record_from_text(std::string_view text, const std::string& what) {
   try {
-    return record_from_json<T>(FieldJson::parse(text));
+    return record_from_json<T>(parse_json<FieldJson>(text));
   } catch (const FieldError& error) {
     throw Error(ErrorCode::kCorrupt, what + ": " + error.message());
   } catch (const nlohmann::json::exception& error) {

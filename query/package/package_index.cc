@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/geometry/cube.h"
 
@@ -54,12 +55,12 @@ class Parser {
            std::string("'") + kFormat + "'");
     if (json.value("version", Json()) != kVersion)
       throw Error(ErrorCode::kUnsupportedVersion,
-                  path_ + ": it has version " + json.value("version", Json()).dump() +
+                  path_ + ": it has version " + exact_json_text(json.value("version", Json())) +
                       " of the format, expected version " + std::to_string(kVersion));
     PackageIndex index;
     const Json& manifest = member(json, "manifest");
     expect(manifest.is_object(), "'manifest'", "an object");
-    index.manifest = manifest.dump();
+    index.manifest = exact_json_text(manifest);
     for (const Json& band : list(json, "bands")) index.bands.push_back(band_of(band));
     expect(index.bands.size() <= kMaxBands, "'bands'", "at most two bands of each level");
     const Json& directory = member(json, "directory");
@@ -162,12 +163,12 @@ std::string index_text(const PackageIndex& index) {
   directory["pages"] = std::move(pages);
   const Json json = {{"format", kFormat},
                      {"version", kVersion},
-                     {"manifest", Json::parse(index.manifest)},
+                     {"manifest", parse_json<Json>(index.manifest)},
                      {"bands", std::move(bands)},
                      {"directory", std::move(directory)},
                      {"packs", std::move(packs)},
                      {"viewer", std::move(viewer)}};
-  return json.dump() + "\n";
+  return exact_json_text(json) + "\n";
 }
 
 PackageIndex parse_index(std::string_view text, const std::string& path) {

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/cube.h"
@@ -44,11 +45,11 @@ PackageReader::PackageReader(FileSystem& files, const std::string& folder)
     : files_(files), folder_(folder) {
   const std::string path = path_of(kIndexName);
   index_ = parse_index(read_small_file(files_, path, kMaxIndexBytes), path);
-  const auto manifest = nlohmann::json::parse(index_.manifest);
+  const auto manifest = parse_json<nlohmann::json>(index_.manifest);
   const auto levels = manifest.value("levels", nlohmann::json());
   if (!levels.is_number_unsigned() || levels.get<uint64_t>() < kBrickLevels ||
       levels.get<uint64_t>() > uint64_t{kMaxGridLevels})
-    corrupt(path, "'levels' of the manifest is " + levels.dump() +
+    corrupt(path, "'levels' of the manifest is " + exact_json_text(levels) +
                       ": expected a whole number from " + std::to_string(kBrickLevels) + " to " +
                       std::to_string(kMaxGridLevels));
   if (manifest.value("tile_levels", nlohmann::json()) != kPackageTileLevels)

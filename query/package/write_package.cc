@@ -8,6 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
@@ -171,10 +172,10 @@ std::string digest_of(const PackageIndex& index) {
 // written, with the member "colors" removed.
 void complete_manifest(const PackageSpec& spec, PackageIndex& index) {
   index.manifest = spec.manifest;
-  auto manifest = nlohmann::ordered_json::parse(spec.manifest);
+  auto manifest = parse_json<nlohmann::ordered_json>(spec.manifest);
   manifest["digest"] = digest_of(index);
   if (!spec.colors) manifest.erase("colors");
-  index.manifest = manifest.dump();
+  index.manifest = exact_json_text(manifest);
 }
 
 PackageReport report_of(const PackageIndex& index) {
@@ -183,7 +184,7 @@ PackageReport report_of(const PackageIndex& index) {
   report.bytes = index.directory.bytes;
   for (const PackageFile& pack : index.packs) report.bytes += pack.bytes;
   for (const PackageBand& band : index.bands) report.blocks += band.blocks;
-  report.digest = nlohmann::ordered_json::parse(index.manifest)["digest"];
+  report.digest = parse_json<nlohmann::ordered_json>(index.manifest)["digest"];
   return report;
 }
 

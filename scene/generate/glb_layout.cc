@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "scene/glb_arrays.h"
 
 namespace voxdag {
@@ -139,7 +140,7 @@ std::string GlbLayout::json_text(const std::string& generator,
     root["materials"].push_back(material_json(material));
   if (instance_count_ > 0)
     root["extensionsUsed"] = root["extensionsRequired"] = json::array({"EXT_mesh_gpu_instancing"});
-  return root.dump();
+  return exact_json_text(root);
 }
 
 }  // namespace voxdag

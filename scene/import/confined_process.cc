@@ -19,6 +19,7 @@
 #include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag {
 namespace {
@@ -65,7 +66,7 @@ void confine(uint64_t memory_bytes, pid_t parent) {
 
 [[noreturn]] void run_child(int output, const std::function<void(const SendMessage&)>& work) {
   const auto send = [&](const json& message) {
-    write_all(output, message.dump(-1, ' ', true, json::error_handler_t::replace) + "\n");
+    write_all(output, ascii_json_text(message) + "\n");
   };
   const auto fail = [&](ErrorCode code, const char* message) {
     send({{"error", error_name(code)}, {"message", message}});
@@ -170,7 +171,7 @@ void run_confined(const std::string& what, uint64_t memory_bytes,
   Child child(memory_bytes, work);
   json error;
   child.read_lines(cancel, [&](std::string_view line) {
-    json message = json::parse(line, nullptr, false);
+    json message = try_parse_json<json>(line);
     if (!message.is_object()) return;
     if (message.contains("error"))
       error = std::move(message);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "scene/messages.h"
 
 namespace voxdag {
@@ -132,8 +133,7 @@ std::optional<size_t> GlbExport::mesh_of(const aiNode& node) {
 
 void GlbExport::write(const std::string& path, MemoryBudget& budget,
                       const std::function<void(uint64_t)>& advance) {
-  GlbFile file(files_, path, root_.dump(-1, ' ', false, json::error_handler_t::replace),
-               bin_bytes_);
+  GlbFile file(files_, path, json_text(root_), bin_bytes_);
   for (const MeshExport& mesh : meshes_) {
     if (mesh.triangles() == 0) continue;
     mesh.write(file, budget, warnings_);

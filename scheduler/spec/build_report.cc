@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "core/io/file_system.h"
 #include "scheduler/spec/report_fields.h"
 
@@ -11,7 +12,7 @@ namespace voxdag {
 
 std::string report_json(const BuildReport& report) {
   // Replaces invalid UTF-8, which paths can contain but JSON cannot.
-  return record_json(report).dump(2, ' ', false, FieldJson::error_handler_t::replace);
+  return json_text(record_json(report), 2);
 }
 
 std::vector<std::string> reported_scenes(const BuildSpec& spec) {

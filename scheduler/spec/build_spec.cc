@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "scene/points/columns.h"
 #include "scheduler/spec/build_fields.h"
 
@@ -72,7 +73,7 @@ std::string geometry_json(const GeometryOptions& options) {
   GeometryOptions copy = options;
   JsonVisitor visitor(add);
   fields(visitor, copy);
-  return key.dump();
+  return exact_json_text(key);
 }
 
 void check_options(const BuildSpec& spec) {

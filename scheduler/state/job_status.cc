@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "scheduler/state/work_folder.h"
 
 namespace voxdag {
@@ -47,12 +48,12 @@ std::string status_json(const JobStatus& status, const std::string& cluster) {
   ordered_json json = {
       {"running", status.running},
       {"holder", status.holder},
-      {"geometry", ordered_json::parse(status.geometry, nullptr, false)},
+      {"geometry", try_parse_json<ordered_json>(status.geometry)},
       {"subvolumes", {{"total", status.subvolumes}, {"built", status.built}}},
       {"stages", stages},
   };
   if (status.geometry.empty()) json["geometry"] = nullptr;
-  if (!cluster.empty()) json["cluster"] = ordered_json::parse(cluster);
+  if (!cluster.empty()) json["cluster"] = parse_json<ordered_json>(cluster);
   if (const auto& p = status.progress) {
     json["stage"] = p->stage;
     json["unit"] = p->unit;
@@ -64,7 +65,7 @@ std::string status_json(const JobStatus& status, const std::string& cluster) {
     json["disk_bytes"] = p->disk_bytes;
     json["last_error"] = p->last_error;
   }
-  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace);
+  return json_text(json, 2);
 }
 
 }  // namespace voxdag

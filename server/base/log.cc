@@ -5,6 +5,7 @@
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "core/fields/field.h"
+#include "core/fields/json_text.h"
 #include "server/base/time_text.h"
 
 namespace voxdag::server {
@@ -38,7 +39,7 @@ std::string json_line(const LogEntry& entry, double unix_s) {
                        {"from", r.from},
                        {"duration_s", r.duration_s}};
   }
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return json_text(json);
 }
 
 }  // namespace

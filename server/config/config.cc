@@ -4,6 +4,7 @@
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "scheduler/cluster/cluster.h"
 #include "server/base/http_url.h"
 #include "server/http/connection/listener.h"
@@ -149,7 +150,7 @@ void fields(Visitor& visit, ServerConfig& c) {
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config) {
   const std::string text = read_small_file(files, path, kMaxConfigBytes);
   try {
-    set_options(FieldJson::parse(text), "the file", config);
+    set_options(parse_json<FieldJson>(text), "the file", config);
   } catch (const nlohmann::json::exception& error) {
     throw Error(ErrorCode::kInvalidInput, path + " is not JSON (" + error.what() +
                                               "): expected a JSON object with the settings");

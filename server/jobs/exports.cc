@@ -8,8 +8,8 @@
 #include "core/base/clock.h"
 #include "core/base/process_limits.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "core/io/random_id.h"
-#include "server/base/json_text.h"
 #include "server/jobs/process/export_process.h"
 #include "server/jobs/run_child.h"
 

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 
-#include "server/base/json_text.h"
+#include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag::server {
 namespace {

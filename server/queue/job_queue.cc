@@ -1,12 +1,13 @@
 #include "server/queue/job_queue.h"
 
 #include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/db/table_rows.h"
+#include "core/fields/json_text.h"
 #include "core/io/random_id.h"
-#include "server/base/json_text.h"
 #include "server/base/warning_json.h"
 #include "server/disk/store.h"
 #include "server/queue/search_sql.h"
@@ -133,7 +134,7 @@ Job read_job(const SqlStatement& statement) {
   bool damaged = false;
   const auto read = [&](const std::string& text, auto& value) {
     try {
-      nlohmann::json::parse(text).get_to(value);
+      parse_json<nlohmann::json>(text).get_to(value);
     } catch (const nlohmann::json::exception&) {
       damaged = true;
     }
@@ -144,7 +145,7 @@ Job read_job(const SqlStatement& statement) {
     damaged = true;
   };
   const auto is_json = [](const std::string& text) {
-    return text.empty() || nlohmann::json::accept(text);
+    return text.empty() || !try_parse_json<nlohmann::json>(text).is_discarded();
   };
   read(row.scenes, job.scenes);
   read(row.warnings, job.warnings);

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/fields/json_text.h"
 #include "core/image/jpeg_writer.h"
 #include "query/dag/dag_view.h"
 #include "query/render/renderer.h"
@@ -33,7 +34,7 @@ std::string render_poster(const voxdag_reader::File& file, const query::PackageS
                           Progress& progress, const CancelToken& cancel) {
   const query::DagView dag(file);
   if (dag.empty()) return "";
-  const auto manifest = nlohmann::json::parse(spec.manifest);
+  const auto manifest = parse_json<nlohmann::json>(spec.manifest);
   query::RenderOptions options;
   options.width = kPosterWidth;
   options.height = kPosterHeight;

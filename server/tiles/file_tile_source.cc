@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
 #include "server/tiles/manifest.h"
@@ -61,7 +62,7 @@ const std::string& FileTileSource::manifest(const CancelToken& cancel) const {
   const auto known = manifests_ ? manifests_->find(digest_) : std::nullopt;
   // Verifies the checksum of the root's bytes before the manifest is computed from them.
   if (!known && !dag_.empty()) blocks_.expect_intact(dag_.level(0).words.data(), 8);
-  manifest_ = known ? *known : file_manifest(*file_, dag_, digest_, cancel).dump();
+  manifest_ = known ? *known : exact_json_text(file_manifest(*file_, dag_, digest_, cancel));
   expect_readable();
   if (manifests_ && !known) manifests_->keep(digest_, manifest_);
   has_manifest_ = true;

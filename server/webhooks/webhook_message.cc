@@ -3,9 +3,12 @@
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
 
+#include <nlohmann/json.hpp>
+
 #include "core/base/error.h"
 #include "core/base/text.h"
-#include "server/base/json_text.h"
+#include "core/fields/json_text.h"
+#include "server/base/printable_json.h"
 #include "server/base/time_text.h"
 
 namespace voxdag::server {
@@ -16,7 +19,7 @@ using nlohmann::ordered_json;
 // Returns the members `names` of a JSON text; null for a missing member or a text that is not an
 // object.
 ordered_json members_of(const std::string& text, const std::vector<const char*>& names) {
-  const ordered_json json = ordered_json::parse(text, nullptr, false);
+  const ordered_json json = try_parse_json<ordered_json>(text);
   ordered_json members = ordered_json::object();
   for (const char* name : names)
     members[name] = json.is_object() && json.contains(name) ? json[name] : ordered_json();

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "client/http_client.h"
@@ -12,8 +13,9 @@
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "core/io/random_id.h"
-#include "server/base/json_text.h"
+#include "server/base/printable_json.h"
 #include "server/base/request_error.h"
 #include "server/base/time_text.h"
 #include "server/webhooks/certificates.h"

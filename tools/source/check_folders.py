@@ -29,12 +29,20 @@ CORE_INCLUDES = {
 CORE = list(CORE_INCLUDES)
 PRODUCT_INCLUDES = CORE_INCLUDES | {
     # core/format: SHA-256
-    "scene": ["core/base", "core/io", "core/geometry", "core/color", "core/image", "core/format"],
+    "scene": [
+        "core/base",
+        "core/fields",
+        "core/io",
+        "core/geometry",
+        "core/color",
+        "core/image",
+        "core/format",
+    ],
     "merge": CORE,
     "scheduler": CORE + ["scene", "merge", "query"],
     "library": CORE + ["scene", "scheduler"],
     "query": CORE + ["scene", "merge"],
-    "client": ["core/base", "core/io", "core/format"],  # core/format: SHA-256
+    "client": ["core/base", "core/fields", "core/io", "core/format"],  # core/format: SHA-256
     "server": CORE + ["scene", "scheduler", "query", "client"],
     "cli": CORE + ["scene", "scheduler", "query", "client", "server"],
     "python": CORE + ["scene", "scheduler", "query"],

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "query/export/dag_export.h"
 #include "query/export/export_job.h"
@@ -187,8 +188,7 @@ class ChunkWriter {
                            {"levels", std::move(levels)}};
     report_.manifest = request_.request.output + "/manifest.json";
     files_.make_directories(request_.request.output);
-    write_file_atomically(files_, report_.manifest,
-                          manifest.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+    write_file_atomically(files_, report_.manifest, json_text(manifest, 1) + "\n");
   }
 
   FileSystem& files_;

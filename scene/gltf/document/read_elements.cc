@@ -4,6 +4,7 @@
 #include <array>
 #include <string_view>
 
+#include "core/fields/json_text.h"
 #include "scene/gltf/uri/data_uri.h"
 #include "scene/messages.h"
 
@@ -171,7 +172,7 @@ Instancing read_instancing(const JsonElement& node) {
 std::string unescape(const ReadableFile& file, const RawString& uri) {
   std::string quoted(static_cast<size_t>(uri.characters.size) + 2, '"');
   file.read_at(uri.characters.begin - 1, std::as_writable_bytes(std::span(quoted)));
-  return uri.is_escaped ? JsonElement::Json::parse(quoted).get<std::string>()
+  return uri.is_escaped ? parse_json<JsonElement::Json>(quoted).get<std::string>()
                         : quoted.substr(1, quoted.size() - 2);
 }
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/fields/json_text.h"
+
 namespace voxdag::gltf {
 
 namespace {
@@ -15,7 +17,7 @@ std::string text_of(const Json& value) {
   const double number = value.is_number_float() ? value.get<double>() : 0.5;
   const bool is_whole = number == std::floor(number) && std::abs(number) <= kExact;
   return is_whole && !std::signbit(number) ? std::to_string(static_cast<int64_t>(number))
-                                           : value.dump();
+                                           : exact_json_text(value);
 }
 
 }  // namespace
@@ -55,7 +57,7 @@ void ElementTextWriter::begin_value(std::string_view key) {
   if (!around.is_object) return;
   ++written_.members;
   written_.string_bytes += key.size();
-  written_.text.append(Json(key).dump()).append(":");
+  written_.text.append(exact_json_text(Json(key))).append(":");
 }
 
 }  // namespace voxdag::gltf

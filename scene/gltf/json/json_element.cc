@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/fields/json_text.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -11,7 +12,7 @@ std::string describe(const nlohmann::json& value) {
   if (value.is_object()) return "an object";
   if (value.is_array()) return "an array";
   if (value.is_string()) return "a string";
-  return value.dump();
+  return exact_json_text(value);
 }
 
 }  // namespace

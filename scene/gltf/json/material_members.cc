@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "core/fields/json_text.h"
 #include "scene/messages.h"
 
 namespace voxdag::gltf {
@@ -139,7 +140,7 @@ bool has_shape(const MemberJson& value, Shape shape) {
 std::string shown(const MemberJson& value) {
   if (value.is_object()) return "an object";
   if (value.is_string()) return '"' + printable(value.get_ref<const std::string&>()) + '"';
-  if (!value.is_array()) return value.dump();
+  if (!value.is_array()) return exact_json_text(value);
   const bool are_all = are_numbers(value, value.size());
   return "an array of " + std::to_string(value.size()) + (are_all ? " numbers" : " values") +
          (are_all ? "" : " that are not all numbers");
@@ -169,7 +170,7 @@ void remove_broken(MemberJson& object, std::span<const MemberRule> rules, const 
 
 std::string without_broken_members(MaterialSection section, const ElementText& element,
                                    const ReportMember& report) {
-  MemberJson value = MemberJson::parse(element.text);
+  MemberJson value = parse_json<MemberJson>(element.text);
   if (!value.is_object()) {
     report("", "is " + shown(value) + ", expected an object; it is ignored");
     return "{}";
@@ -182,7 +183,7 @@ std::string without_broken_members(MaterialSection section, const ElementText& e
     is_broken = true;
     report(given, message);
   });
-  return is_broken ? value.dump() : element.text;
+  return is_broken ? exact_json_text(value) : element.text;
 }
 
 }  // namespace voxdag::gltf

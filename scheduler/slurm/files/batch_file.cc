@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "core/format/artifact/artifact_fields.h"
 #include "core/format/checksum.h"
 #include "scheduler/triangles/chunk.h"
@@ -119,7 +120,7 @@ double Batch::weight() const {
 void write_batch(FileSystem& files, const std::string& path, const Batch& batch,
                  const std::function<std::unique_ptr<TriangleStream>(size_t)>& open,
                  const RowFile* rows, const CancelToken& cancel) {
-  const std::string header = record_json(batch).dump();
+  const std::string header = exact_json_text(record_json(batch));
   const auto header_bytes = std::as_bytes(std::span(header));
   Prologue prologue{{}, header.size(), checksum64(header_bytes)};
   std::memcpy(prologue.magic, kBatchMagic.data(), sizeof prologue.magic);

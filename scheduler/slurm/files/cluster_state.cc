@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "core/format/artifact/artifact_fields.h"
 #include "scheduler/slurm/files/cluster_folder.h"
 #include "scheduler/solid/solid_rows.h"
@@ -72,7 +73,7 @@ OpenBatch* ClusterState::find(uint32_t batch) {
 }
 
 std::string encode_state(const ClusterState& state) {
-  return record_json(state).dump(1, ' ', false, FieldJson::error_handler_t::replace) + "\n";
+  return json_text(record_json(state), 1) + "\n";
 }
 
 ClusterState decode_state(const std::string& text) {

@@ -4,6 +4,7 @@
 
 #include "core/base/error.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "core/format/artifact/artifact_fields.h"
 #include "core/format/checksum.h"
 
@@ -52,8 +53,7 @@ std::string checksum_text(std::string_view text) {
 
 template <class Record>
 std::string seal(const Record& record) {
-  const std::string line =
-      record_json(record).dump(-1, ' ', false, FieldJson::error_handler_t::replace);
+  const std::string line = json_text(record_json(record));
   return line + "\n" + checksum_text(line) + "\n";
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/fields/json_text.h"
 #include "scheduler/stages/plan/estimate_range.h"
 #include "scheduler/triangles/chunk.h"
 
@@ -51,14 +52,14 @@ ClusterPlan plan_cluster(const Estimate& estimate, uint64_t tasks) {
 }
 
 std::string cluster_plan_json(const Estimate& estimate, const ClusterPlan& plan) {
-  auto json = nlohmann::ordered_json::parse(estimate_json(estimate));
+  auto json = parse_json<nlohmann::ordered_json>(estimate_json(estimate));
   json["cluster"] = {{"tasks", plan.tasks},
                      {"task_memory_bytes", plan.memory_bytes},
                      {"cpu_hours", range_json(plan.cpu_hours)},
                      {"task_s", range_json(plan.task_s)},
                      {"merge_s", range_json(plan.merge_s)},
                      {"shared_bytes", count_json(plan.shared_bytes)}};
-  return json.dump(2);
+  return exact_json_text(json, 2);
 }
 
 }  // namespace voxdag

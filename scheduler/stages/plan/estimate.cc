@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "scheduler/solid/row_sums.h"
 #include "scheduler/solid/solid_report.h"
 #include "scheduler/spec/memory_plan.h"
@@ -356,7 +357,7 @@ std::string estimate_json(const Estimate& e) {
                       {"artifact_bytes", count_json(c->artifact_bytes)},
                       {"spill_bytes", count_json(c->spill_bytes)},
                       {"cpu_s", range_json(c->cpu_s)}};
-  return json.dump(2);
+  return exact_json_text(json, 2);
 }
 
 }  // namespace voxdag

@@ -2,7 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "server/base/json_text.h"
+#include "core/fields/json_text.h"
+#include "server/base/printable_json.h"
 #include "server/base/time_text.h"
 
 namespace voxdag::server {
@@ -31,11 +32,11 @@ std::string export_json(const Export& it, const LiveJob* live) {
       {"id", it.id},
       {"job", it.job},
       {"state", name_of(it.state)},
-      {"request", ordered_json::parse(it.request, nullptr, false)},
+      {"request", try_parse_json<ordered_json>(it.request)},
       {"created_at", time_or_null(it.created_s)},
       {"started_at", time_or_null(it.started_s)},
       {"finished_at", time_or_null(it.finished_s)},
-      {"progress", progress.empty() ? ordered_json() : ordered_json::parse(progress)},
+      {"progress", progress.empty() ? ordered_json() : parse_json<ordered_json>(progress)},
       {"error", it.error_code.empty()
                     ? ordered_json()
                     : ordered_json{{"code", it.error_code}, {"message", it.error_message}}},

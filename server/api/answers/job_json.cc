@@ -1,6 +1,9 @@
 #include "server/api/answers/job_json.h"
 
-#include "server/base/json_text.h"
+#include <nlohmann/json.hpp>
+
+#include "core/fields/json_text.h"
+#include "server/base/printable_json.h"
 #include "server/base/time_text.h"
 #include "server/base/warning_json.h"
 
@@ -39,7 +42,7 @@ std::string links(const std::string& self) {
 // all other members.
 std::string request_members(const std::string& request) {
   using nlohmann::ordered_json;
-  const auto stored = ordered_json::parse(request, nullptr, false);
+  const auto stored = try_parse_json<ordered_json>(request);
   ordered_json members = {{"scene", ordered_json::array()},
                           {"resolution", 0},
                           {"options", ordered_json::object()},

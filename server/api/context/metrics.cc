@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/fields/json_text.h"
+
 namespace voxdag::server {
 namespace {
 
@@ -32,7 +34,7 @@ void Metrics::count_run(const Job& job) {
   std::lock_guard lock(mutex_);
   ++runs_[state_name(job.state)];
   if (job.state != JobState::kSucceeded) return;
-  const auto result = nlohmann::json::parse(job.result, nullptr, false);
+  const auto result = try_parse_json<nlohmann::json>(job.result);
   if (!result.is_object()) return;
   voxels_ += result.value("voxels", uint64_t{0});
   result_bytes_ += result.value("bytes", uint64_t{0});

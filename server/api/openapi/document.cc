@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "core/base/text.h"
+#include "core/fields/json_text.h"
 #include "scene/formats/formats.h"
 #include "server/api/openapi/schemas.h"
 #include "server/http/message/target.h"
@@ -217,22 +218,23 @@ std::string openapi_document(const Router& router) {
     const Json tag = {{"name", route.tag}};
     if (std::find(tags.begin(), tags.end(), tag) == tags.end()) tags.push_back(tag);
   }
-  return Json{{"openapi", "3.1.0"},
-              {"info",
-               {{"title", "voxdag"},
-                {"version", "1"},
-                {"summary", "Builds sparse voxel DAGs from triangle scenes"},
-                {"description", "See docs/api.md."},
-                {"license", {{"name", "See LICENSE"}}}}},
-              {"servers", {{{"url", "/"}}}},
-              {"security", {Json::object(), {{"bearer", Json::array()}}}},
-              {"tags", tags},
-              {"paths", paths},
-              {"components",
-               {{"securitySchemes", {{"bearer", {{"type", "http"}, {"scheme", "bearer"}}}}},
-                {"responses", problems},
-                {"schemas", schemas()}}}}
-      .dump();
+  const Json document = {
+      {"openapi", "3.1.0"},
+      {"info",
+       {{"title", "voxdag"},
+        {"version", "1"},
+        {"summary", "Builds sparse voxel DAGs from triangle scenes"},
+        {"description", "See docs/api.md."},
+        {"license", {{"name", "See LICENSE"}}}}},
+      {"servers", {{{"url", "/"}}}},
+      {"security", {Json::object(), {{"bearer", Json::array()}}}},
+      {"tags", tags},
+      {"paths", paths},
+      {"components",
+       {{"securitySchemes", {{"bearer", {{"type", "http"}, {"scheme", "bearer"}}}}},
+        {"responses", problems},
+        {"schemas", schemas()}}}};
+  return exact_json_text(document);
 }
 
 }  // namespace voxdag::server

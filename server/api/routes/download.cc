@@ -4,6 +4,7 @@
 
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "core/io/random_id.h"
 #include "scene/messages.h"
 #include "server/api/answers/public_problem.h"
@@ -98,7 +99,7 @@ Job finished_job(Context& context, Call& call) {
 std::string download_stem(const Job& job, uint64_t resolution) {
   std::string base = job.name;
   if (base.empty()) {
-    base = nlohmann::json::parse(job.request).at("scene").at(0).get<std::string>();
+    base = parse_json<nlohmann::json>(job.request).at("scene").at(0).get<std::string>();
     base = base.substr(base.rfind('/') + 1);
     base = base.substr(0, base.rfind('.'));
   }

@@ -13,7 +13,7 @@
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
-#include "server/base/json_text.h"
+#include "server/base/printable_json.h"
 #include "server/disk/data_folder.h"
 #include "server/jobs/process/child_process.h"
 

@@ -3,11 +3,12 @@
 
 #include "core/base/error.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/download.h"
 #include "server/api/routes/routes.h"
-#include "server/base/json_text.h"
+#include "server/base/printable_json.h"
 
 namespace voxdag::server {
 namespace {
@@ -18,13 +19,13 @@ const Parameter kMaxLogBytes = {"max_bytes", "maximum size of the answer", "",
 
 // Returns the file name of the result.
 std::string file_name(const Job& job) {
-  return download_stem(job, nlohmann::json::parse(job.request).at("resolution")) + ".vdag";
+  return download_stem(job, parse_json<nlohmann::json>(job.request).at("resolution")) + ".vdag";
 }
 
 Response get_dag(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   return download(context, call, context.files.open_own(context.dispatcher.folder(job.id).result()),
-                  nlohmann::json::parse(job.result).at("sha256"), file_name(job));
+                  parse_json<nlohmann::json>(job.result).at("sha256"), file_name(job));
 }
 
 // Answers with a complete file, which is read while it is sent.
@@ -37,7 +38,7 @@ Response stream_file(Context& context, const std::string& path, Response respons
 Response get_report(Context& context, Call& call) {
   auto permit = context.answers.wait();
   const Job job = finished_job(context, call);
-  auto report = nlohmann::ordered_json::parse(read_own_file(
+  auto report = parse_json<nlohmann::ordered_json>(read_own_file(
       context.files, context.dispatcher.folder(job.id).report(), kMaxSentReportBytes));
   report["output"] = file_name(job);
   make_printable(report);

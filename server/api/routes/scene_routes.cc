@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "scene/formats/formats.h"
 #include "scene/messages.h"
 #include "server/api/answers/job_json.h"
@@ -55,7 +56,7 @@ Response scene_response(Context& context, int status, const std::string& name) {
   const auto scene = context.scenes.find(name);
   if (!scene)
     throw not_found("no such scene: '" + name + "': expected the name of an uploaded scene");
-  Response response = json_response(status, scene_json(*scene).dump());
+  Response response = json_response(status, exact_json_text(scene_json(*scene)));
   const auto upload = context.scenes.upload(name);
   const uint64_t offset = upload ? upload->offset : scene->offset;
   const std::optional<uint64_t> total = upload ? upload->total : scene->size;
@@ -225,7 +226,7 @@ Response list_scenes(Context& context, Call& call) {
     json["next_cursor"] = scenes.back().name;
   }
   for (const Scene& scene : scenes) json["scenes"].push_back(scene_json(scene));
-  Response response = json_response(200, json.dump());
+  Response response = json_response(200, exact_json_text(json));
   response.build_permit = std::move(permit);
   return response;
 }

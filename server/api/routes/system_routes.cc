@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/fields/json_text.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routes/routes.h"
@@ -134,7 +135,7 @@ Response get_machine(Context& context, double started_s) {
       {"free_disk_bytes", context.disk.free()},
       {"min_free_disk_bytes", context.config.jobs.min_free_disk_bytes},
       {"uptime_s", wall_seconds() - started_s}};
-  return json_response(200, json.dump());
+  return json_response(200, exact_json_text(json));
 }
 
 }  // namespace

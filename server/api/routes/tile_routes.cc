@@ -7,6 +7,7 @@
 #include "core/base/error.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "query/tiles/color_page.h"
 #include "query/tiles/tile.h"
@@ -187,7 +188,8 @@ Response consistent_response(const Call& call, const TileSource& dag, const Answ
 // `name` is "".
 std::string with_name(const std::string& manifest, const std::string& name) {
   if (name.empty()) return manifest;
-  return "{\"name\":" + nlohmann::json(printable_line(name)).dump() + "," + manifest.substr(1);
+  return "{\"name\":" + exact_json_text(nlohmann::json(printable_line(name))) + "," +
+         manifest.substr(1);
 }
 
 Response get_manifest(const TileSource& dag, const std::string& name, const CancelToken& stopping) {
@@ -277,7 +279,7 @@ auto with_unfinished_job(Context& context, const Call& call, const Make& make) {
   const Job job = find_job(context.queue, call.names[0]);
   if (job.state == JobState::kSucceeded)
     throw not_found("the job has succeeded: expected an unfinished job");
-  const uint64_t resolution = nlohmann::json::parse(job.request).at("resolution");
+  const uint64_t resolution = parse_json<nlohmann::json>(job.request).at("resolution");
   try {
     return make(job.id, context.dispatcher.folder(job.id), resolution);
   } catch (const Error& error) {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag::server {
 Problem problem(ErrorCode code, std::string detail) {
@@ -28,7 +29,7 @@ std::string problem_json(const Problem& problem) {
                                  {"code", problem.code},
                                  {"detail", printable_line(problem.detail)}};
   if (!problem.state.empty()) json["state"] = problem.state;
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return json_text(json);
 }
 
 Response problem_response(const Problem& problem) {

@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
+#include "core/fields/json_text.h"
 #include "core/format/global/open_global.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/run_build.h"
@@ -99,13 +100,13 @@ ordered_json levels_of(const std::string& path) {
 
 // Returns the members of a build's report that clients may see, and the sizes of the DAG's levels.
 std::string result_json(const std::string& report_text, const std::string& output) {
-  const auto report = ordered_json::parse(report_text);
+  const auto report = parse_json<ordered_json>(report_text);
   ordered_json result;
   for (const char* name : {"sha256", "bytes", "voxels", "svo_nodes", "dag_nodes", "triangles",
                            "wall_s", "cpu_s", "peak_rss_bytes", "bounds"})
     result[name] = report.at(name);
   result["levels"] = levels_of(output);
-  return result.dump();
+  return exact_json_text(result);
 }
 
 // Runs or resumes the build and returns its RESULT, the JSON that docs/api.md defines. The .vdag

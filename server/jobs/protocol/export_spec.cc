@@ -3,7 +3,8 @@
 #include <cmath>
 
 #include "core/base/error.h"
-#include "server/base/json_text.h"
+#include "core/base/text/printable.h"
+#include "core/fields/json_text.h"
 #include "server/jobs/protocol/request_body.h"
 
 namespace voxdag::server {

@@ -3,7 +3,7 @@
 #include <iterator>
 #include <utility>
 
-#include "server/base/json_text.h"
+#include "core/fields/json_text.h"
 #include "server/base/warning_json.h"
 
 namespace voxdag {
@@ -65,7 +65,7 @@ std::string encode(const Message& message) {
 
 std::optional<Message> decode(std::string_view text) {
   try {
-    const auto line = nlohmann::json::parse(text);
+    const auto line = parse_json<nlohmann::json>(text);
     if (!has_whole_numbers(line, 1)) return {};
     return message_of(line, std::make_index_sequence<kKinds>());
   } catch (const nlohmann::json::exception&) {

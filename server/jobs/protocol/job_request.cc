@@ -1,6 +1,6 @@
 #include "server/jobs/protocol/job_request.h"
 
-#include "server/base/json_text.h"
+#include "core/fields/json_text.h"
 #include "server/jobs/protocol/request_body.h"
 
 namespace voxdag::server {

@@ -2,7 +2,7 @@
 
 #include "core/base/error.h"
 #include "core/fields/json_fields.h"
-#include "server/base/json_text.h"
+#include "core/fields/json_text.h"
 
 namespace voxdag::server {
 

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "core/fields/json_fields.h"
+#include "core/fields/json_text.h"
 #include "server/base/request_error.h"
 
 namespace voxdag::server {
@@ -12,7 +13,7 @@ namespace voxdag::server {
 // RequestError{kInvalid} for a body that is not JSON, and FieldError for a wrong member.
 template <class Options>
 FieldJson read_body(std::string_view body, Options& options) {
-  FieldJson json = FieldJson::parse(body, nullptr, false);
+  FieldJson json = try_parse_json<FieldJson>(body);
   if (json.is_discarded())
     throw RequestError(RequestError::Kind::kInvalid,
                        "the body is not JSON: expected a JSON object");

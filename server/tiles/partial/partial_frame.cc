@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/dag/brick.h"
+#include "core/fields/json_text.h"
 #include "core/geometry/grid.h"
 #include "query/render/views.h"
 #include "server/tiles/partial/partial_dag.h"
@@ -25,7 +26,7 @@ std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, const st
     const auto is_outside = [&](uint64_t at) { return at >= resolution || at % edge != 0; };
     if (!std::has_single_bit(edge) || edge < uint64_t{kBrickEdge} || edge > resolution ||
         is_outside(entry.at(0)) || is_outside(entry.at(1)) || is_outside(entry.at(2)))
-      throw Error(ErrorCode::kCorrupt, path + ": 'cubes' has the entry " + entry.dump() +
+      throw Error(ErrorCode::kCorrupt, path + ": 'cubes' has the entry " + exact_json_text(entry) +
                                            ": expected a cube of the octree, [X,Y,Z,EDGE,BUILT]");
     Cube cube{levels - levels_of_resolution(edge), {}};
     for (size_t axis = 0; axis < 3; ++axis)
@@ -47,11 +48,11 @@ std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution) {
                     static_cast<uint32_t>(coarse.brick),
                     static_cast<uint32_t>(coarse.brick >> 32)});
   }
-  return nlohmann::ordered_json{{"resolution", resolution},
-                                {"built", cubes.built()},
-                                {"total", cubes.total()},
-                                {"cubes", std::move(list)}}
-      .dump();
+  const nlohmann::ordered_json json = {{"resolution", resolution},
+                                       {"built", cubes.built()},
+                                       {"total", cubes.total()},
+                                       {"cubes", std::move(list)}};
+  return exact_json_text(json);
 }
 
 nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, uint64_t resolution) {
@@ -61,7 +62,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
   const uint32_t levels = levels_of_resolution(resolution);
   try {
     const auto plan =
-        nlohmann::json::parse(read_own_file(files, folder.subvolumes(), kMaxPlanBytes));
+        parse_json<nlohmann::json>(read_own_file(files, folder.subvolumes(), kMaxPlanBytes));
     const GridPlace place{plan.at("origin"), plan.at("edge")};
     nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
     PartialDag nodes(levels);

@@ -6,6 +6,7 @@
 
 #include "core/base/clock.h"
 #include "core/base/error.h"
+#include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/geometry/grid.h"
 #include "core/io/random_id.h"
@@ -199,7 +200,7 @@ void PartialView::update_tiles(const JobFolder& folder, uint64_t resolution) {
     nlohmann::ordered_json manifest = make_manifest(*merged, uint64_t{0});
     manifest["built"] = manifest["total"];  // rows of built subvolumes may not be on the disk yet
     manifest["merged"] = true;
-    merged->set_manifest(manifest.dump());
+    merged->set_manifest(exact_json_text(manifest));
     merged_ = merged;
     nodes_.clear();
     tiles_version_ = version_;
@@ -208,7 +209,7 @@ void PartialView::update_tiles(const JobFolder& folder, uint64_t resolution) {
   merged_.reset();
   const auto root = nodes_.add(cubes_, levels);
   auto tiles = std::make_shared<PartialTileSource>(nodes_.dag(), levels, nodes_.digest());
-  tiles->set_manifest(make_manifest(*tiles, root).dump());
+  tiles->set_manifest(exact_json_text(make_manifest(*tiles, root)));
   tiles_version_ = version_;
   answers_.set_tiles(std::move(tiles));
 }
