@@ -248,6 +248,10 @@ void Dispatcher::run_job(const Job& job, LiveJob& live) {
     const PublicError seen = public_error(error);
     live.apply(Failure{seen.code, seen.text});
   }
+  // Stored before the state changes, so that clients that wait for the end find the rates.
+  steps_.run("store the rates of job " + job.id, [&] {
+    if (files_.exists(place.path)) write_file_atomically(files_, place.rates(), live.rates_json());
+  });
   record_outcome(job, live, end);
 }
 

@@ -80,24 +80,32 @@ void LiveJob::apply(const Message& message) {
   ++version_;
   const double now = wall_seconds();
   if (const auto* begun = std::get_if<StageBegun>(&message)) {
-    if (stages_.size() == kMaxStages) stages_.erase(stages_.begin());
+    if (stages_.size() == kMaxStages) {
+      stages_.erase(stages_.begin());
+      rates_.erase(rates_.begin());
+    }
+    rates_.emplace_back();
     stages_.push_back({.name = bounded(begun->stage, kMaxLabelBytes),
                        .unit = bounded(begun->unit, kMaxLabelBytes),
                        .total = begun->total,
                        .start_s = now});
   }
-  if (const auto* resumed = std::get_if<StageResumed>(&message); resumed && !stages_.empty())
+  if (const auto* resumed = std::get_if<StageResumed>(&message); resumed && !stages_.empty()) {
     stages_.back().done = stages_.back().resumed_at = resumed->done;
+    rates_.back() = RateHistory(resumed->done);
+  }
   if (const auto* advanced = std::get_if<StageAdvanced>(&message); advanced && !stages_.empty()) {
     StageProgress& stage = stages_.back();
     stage.wall_s = now - stage.start_s;
     stage.ended = false;
     stage.done = advanced->done;
     stage.total = advanced->total;
+    rates_.back().add(stage.wall_s, stage.done);
   }
   if (std::holds_alternative<StageEnded>(message) && !stages_.empty()) {
     stages_.back().wall_s = now - stages_.back().start_s;
     stages_.back().ended = true;
+    rates_.back().add(stages_.back().wall_s, stages_.back().done);
   }
   if (const auto* subvolumes = std::get_if<SubvolumeTotals>(&message)) subvolumes_ = *subvolumes;
   if (const auto* usage = std::get_if<Usage>(&message)) usage_ = *usage;
@@ -121,6 +129,19 @@ std::string LiveJob::progress_json() const {
   return json_;
 }
 
+std::string LiveJob::rates_json() const {
+  using nlohmann::ordered_json;
+  std::lock_guard lock(mutex_);
+  ordered_json stages = ordered_json::array();
+  for (size_t i = 0; i < stages_.size(); ++i) {
+    ordered_json points = ordered_json::array();
+    for (const auto& [wall_s, rate] : rates_[i].points()) points.push_back({wall_s, rate});
+    stages.push_back(
+        {{"name", stages_[i].name}, {"unit", stages_[i].unit}, {"points", std::move(points)}});
+  }
+  return json_text(ordered_json{{"stages", std::move(stages)}});
+}
+
 std::string LiveJob::make_progress() const {
   using nlohmann::ordered_json;
   if (stages_.empty()) return "";
@@ -139,7 +160,7 @@ std::string LiveJob::make_progress() const {
       {"unit", now.unit},
       {"done", now.done},
       {"total", now.total},
-      {"rate", now.rate()},
+      {"rate", rates_.back().rate()},
       {"eta_s", now.eta_s()},
       {"overall", make_overall()},
       {"elapsed_s", wall_seconds() - start_s_},

@@ -13,6 +13,7 @@
 #include "core/base/clock.h"
 #include "server/jobs/overall_progress.h"
 #include "server/jobs/protocol/job_messages.h"
+#include "server/jobs/rate_history.h"
 
 namespace voxdag::server {
 
@@ -30,6 +31,8 @@ class LiveJob {
   // Returns the JSON object PROGRESS of docs/api.md; "" before the first stage. Keeps the text
   // until the next message arrives.
   std::string progress_json() const;
+  // Returns the JSON object RATES of docs/api.md.
+  std::string rates_json() const;
   // Returns the number of messages received so far.
   uint64_t version() const { return locked(version_); }
   // Returns the cluster tasks of this run; nullopt for a build without a cluster.
@@ -59,6 +62,7 @@ class LiveJob {
   const double start_s_ = wall_seconds();
   mutable std::mutex mutex_;  // guards all members below
   std::vector<StageProgress> stages_;
+  std::vector<RateHistory> rates_;  // for each of stages_
   SubvolumeTotals subvolumes_;
   Usage usage_;
   std::optional<ClusterTasks> cluster_tasks_;

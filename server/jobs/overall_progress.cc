@@ -31,13 +31,13 @@ const StageProgress* find_last(std::span<const StageProgress> stages, const std:
 
 }  // namespace
 
-double StageProgress::rate() const {
+double StageProgress::average_rate() const {
   return wall_s > 0 ? static_cast<double>(done - std::min(resumed_at, done)) / wall_s : 0;
 }
 
 double StageProgress::eta_s() const {
   const double left = total > done ? static_cast<double>(total - done) : 0;
-  return rate() > 0 && !ended ? left / rate() : 0;
+  return average_rate() > 0 && !ended ? left / average_rate() : 0;
 }
 
 std::vector<StageShare> long_stages(const GeometryOptions& options) {

@@ -18,8 +18,8 @@ struct StageProgress {
   uint64_t resumed_at = 0;       // units of `done` that earlier attempts completed
   double start_s = 0, wall_s = 0;
   bool ended = false;
-  // Units per second in this attempt; 0 if unknown.
-  double rate() const;
+  // Average of units per second in this attempt; 0 if unknown.
+  double average_rate() const;
   // Estimated remaining seconds of the stage; 0 if unknown or ended.
   double eta_s() const;
 };

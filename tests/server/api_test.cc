@@ -84,6 +84,16 @@ TEST_F(Api, TurnsASceneIntoADag) {
   const Json cubes = Json::parse(http_->get("/api/v1/jobs/" + id + "/subvolumes").body);
   EXPECT_EQ(cubes["cubes"].size(), cubes["total"].get<size_t>());
   EXPECT_EQ(cubes["built"], cubes["total"]);
+  const Json rates = Json::parse(http_->get("/api/v1/jobs/" + id + "/rates").body);
+  ASSERT_EQ(rates["stages"].size(), done["progress"]["stages"].size());
+  for (size_t i = 0; i < rates["stages"].size(); ++i) {
+    const Json &stage = done["progress"]["stages"][i], &points = rates["stages"][i]["points"];
+    EXPECT_EQ(rates["stages"][i]["name"], stage["name"]);
+    EXPECT_EQ(rates["stages"][i]["unit"], stage["unit"]);
+    ASSERT_FALSE(points.empty()) << stage["name"];
+    EXPECT_EQ(points.back()[0], stage["wall_s"]);
+  }
+  EXPECT_EQ(done["progress"]["rate"], rates["stages"].back()["points"].back()[1]);
   const std::string text = http_->get("/api/v1/jobs/" + id + "/log").body;
   EXPECT_NE(text.find("merge: "), std::string::npos) << text;
   EXPECT_EQ(text.find(folder_.path()), std::string::npos) << "contains a path of this machine";

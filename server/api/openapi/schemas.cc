@@ -134,6 +134,9 @@ void add_progress(Json& all) {
               {"memory_bytes", count()},
               {"disk_bytes", count()},
               optional("cluster", described("only of a job that a cluster builds", cluster))});
+  const Json point = described("seconds since the stage began, units per second", array(number()));
+  all["Rates"] = object(
+      {{"stages", array(object({{"name", text()}, {"unit", text()}, {"points", array(point)}}))}});
 }
 
 void add_jobs(Json& all) {

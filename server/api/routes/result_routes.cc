@@ -83,6 +83,20 @@ Response get_subvolumes(Context& context, Call& call) {
   return stream_file(context, path, json_response(200, ""));
 }
 
+// Answers with the rates of a running attempt, or else with the stored rates of the last attempt.
+Response get_rates(Context& context, Call& call) {
+  const Job job = find_job(context.queue, call.names[0]);
+  const std::string path = context.dispatcher.folder(job.id).rates();
+  if (const auto live = context.dispatcher.live(job.id)) {
+    auto permit = context.answers.wait();
+    Response response = json_response(200, live->rates_json());
+    response.build_permit = std::move(permit);
+    return response;
+  }
+  if (!context.files.exists(path)) return json_response(200, R"({"stages":[]})");
+  return stream_file(context, path, json_response(200, ""));
+}
+
 }  // namespace
 
 void add_result_routes(Router& router) {
@@ -113,6 +127,8 @@ void add_result_routes(Router& router) {
       get_log, {kMaxLogBytes});
   add("subvolumes", "getSubvolumes", "The occupied subvolumes and whether they are built",
       {200, "cubes in voxels", {json_content("Subvolumes")}}, get_subvolumes);
+  add("rates", "getRates", "The rate of each stage over time",
+      {200, "points of a chart", {json_content("Rates")}}, get_rates);
 }
 
 }  // namespace voxdag::server

@@ -16,6 +16,7 @@ struct JobFolder {
   std::string report() const { return result() + ".report.json"; }
   std::string work() const { return file("work"); }
   std::string subvolumes() const { return file("subvolumes.json"); }
+  std::string rates() const { return file("rates.json"); }  // of the last attempt that ended
   std::string preview() const { return file("preview.png"); }
   std::string file(const std::string& name) const {
     return path.empty() ? name : path + "/" + name;

@@ -45,7 +45,7 @@ class JobPage {
     this.progress = new ProgressView();
     this.timeline = new Timeline();
     this.cluster = new ClusterView();
-    this.rate = new RatePlot(id);
+    this.rate = new RatePlot(`${this.path}/rates`, signal);
     this.cubes = new CubesView(`${this.path}/subvolumes`, signal);
     this.exports = new ExportsView(`${this.path}/exports`, signal);
     this.log = new LogView(`${this.path}/log`, signal);
@@ -128,7 +128,7 @@ class JobPage {
     this.progress.show(this.job);
     this.timeline.show(this.job);
     this.cluster.show(this.job);
-    this.rate.add(this.job);
+    this.rate.update(this.job, () => this.showParts(this.job));
     this.showParts(this.job);
     this.cubes.update(this.job);
   }

@@ -1,21 +1,20 @@
-// Plots the rate of each stage over time, from the updates that this page has received.
+// Plots the rate of each stage over time. The service records the rates, so the plot is the same on
+// each page that shows the job.
 
+import {getJson} from "../lib/api.js";
 import {clear, h, setText, svg} from "../lib/dom.js";
 import {durationText, shortCount} from "../lib/format.js";
 
 const kWidth = 520, kHeight = 170;
 const kLeft = 52, kRight = 8, kTop = 10, kBottom = 24;
-const kWindowS = 2;       // minimum duration over which a rate is averaged
-const kMaxSamples = 600;  // if there are more samples, every other sample is dropped
-
-// Maps a job's id to the series of its stages. The series are kept until the browser leaves the
-// dashboard, so that they are shown again when the user returns to a job.
-const seriesByJob = new Map();
+const kMinIntervalMs = 3000;  // between two requests
 
 export class RatePlot {
-  constructor(id) {
-    if (!seriesByJob.has(id)) seriesByJob.set(id, new Map());
-    this.series = seriesByJob.get(id);
+  constructor(path, signal) {
+    this.path = path;
+    this.signal = signal;
+    this.stages = [];
+    this.nextFetchMs = 0;
     this.chosen = null;  // the stage chosen by the user; null for the current stage
     this.tabs = h("div", {class: "tabs", role: "group", "aria-label": "Stage"});
     this.note = h("p", {class: "faint"});
@@ -24,46 +23,62 @@ export class RatePlot {
     this.draw();
   }
 
-  add(job) {
-    const p = job.progress;
-    if (job.state === "running" && p.stage) this.record(p);
+  // Draws the rates of the job. Fetches them at a limited rate while the job runs, and after
+  // each change of its state. Calls `onChange` after each fetch.
+  async update(job, onChange) {
+    if (job.attempts !== this.job?.attempts) this.stages = [];
+    this.job = job;
     this.draw();
+    const p = job.progress;
+    const key = `${job.attempts} ${p?.stage} ${p?.done} ${job.state}`;
+    const isDue = job.state !== "running" || performance.now() >= this.nextFetchMs;
+    if (!p || key === this.key || !isDue || this.fetching) return;
+    this.fetching = true;
+    try {
+      this.stages = (await getJson(this.path, this.signal)).stages;
+      this.key = key;
+    } catch {
+      if (this.signal.aborted) return;
+    } finally {
+      this.fetching = false;
+      this.nextFetchMs = performance.now() + kMinIntervalMs;
+    }
+    this.draw();
+    onChange();
   }
 
-  record(p) {
-    let series = this.series.get(p.stage);
-    const known = p.stages?.find((stage) => stage.name === p.stage);
-    const time = known ? known.wall_s : p.elapsed_s;
-    if (!series || time < series.marks.at(-1).time)  // a new attempt
-      this.series.set(p.stage, series = {unit: p.unit, marks: [], samples: []});
-    series.marks.push({time, done: p.done});
-    while (series.marks.length > 2 && time - series.marks[1].time >= kWindowS) series.marks.shift();
-    const from = series.marks[0];
-    if (time - from.time < 0.4) return;
-    series.samples.push([time, (p.done - from.done) / (time - from.time)]);
-    if (series.samples.length > kMaxSamples)
-      series.samples = series.samples.filter((_, i) => i % 2 === 0);
-    this.current = p.stage;
+  // Returns the points of each stage by its name. The present rate of a running job is the last
+  // point of its current stage.
+  series() {
+    const series = new Map(this.stages.map(({name, unit, points}) => [name, {unit, points}]));
+    const p = this.job?.progress, now = p?.stages?.at(-1);
+    if (this.job?.state === "running" && now && now.wall_s > 0) {
+      const earlier = series.get(p.stage)?.points ?? [];
+      const points = earlier.filter(([time]) => time < now.wall_s);
+      series.set(p.stage, {unit: p.unit, points: [...points, [now.wall_s, p.rate]]});
+    }
+    return series;
   }
 
   draw() {
-    const names =
-        [...this.series.keys()].filter((name) => this.series.get(name).samples.length > 1);
+    const series = this.series();
+    const names = [...series.keys()].filter((name) => series.get(name).points.length > 1);
+    const current = this.job?.progress?.stage;
     const name = names.includes(this.chosen) ? this.chosen :
-        names.includes(this.current)         ? this.current :
-                                               longest(this.series, names);
+        names.includes(current)              ? current :
+                                               longest(series, names);
     this.showTabs(names, name);
     this.picture.toggleAttribute("hidden", !name);
     this.empty = !name;
     if (!name) {
-      setText(this.note, "Recorded while the job runs and this page is open.");
+      setText(this.note, "Shown once a stage has run for some seconds.");
       return;
     }
-    const {samples, unit} = this.series.get(name);
+    const {points, unit} = series.get(name);
     setText(this.note, `${unit} per second during ${name}`);
     this.picture.setAttribute(
-        "aria-label", `Rate of ${name}: now ${shortCount(samples.at(-1)[1])} ${unit} per second`);
-    clear(this.picture, plot(samples));
+        "aria-label", `Rate of ${name}: latest ${shortCount(points.at(-1)[1])} ${unit} per second`);
+    clear(this.picture, plot(points));
   }
 
   showTabs(names, shown) {
@@ -92,7 +107,7 @@ export class RatePlot {
 }
 
 function longest(series, names) {
-  const size = (name) => series.get(name).samples.length;
+  const size = (name) => series.get(name).points.length;
   return names.reduce((best, name) => (best && size(best) >= size(name) ? best : name), null);
 }
 

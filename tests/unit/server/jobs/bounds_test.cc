@@ -60,5 +60,20 @@ TEST(JobBounds, TextsOfTheProcessAreCutAndPrintable) {
   EXPECT_EQ(live.result(), "");
 }
 
+TEST(JobBounds, TheRatesOfManyStagesAreBounded) {
+  LiveJob live(0);
+  for (uint64_t stage = 0; stage < 200; ++stage) {
+    live.apply(StageBegun{"stage " + std::to_string(stage), "units", 1000});
+    for (uint64_t i = 1; i <= 1000; ++i) live.apply(StageAdvanced{i, 1000});
+    live.apply(StageEnded{});
+  }
+  const auto rates = nlohmann::json::parse(live.rates_json());
+  EXPECT_EQ(rates["stages"].size(), 64u);
+  EXPECT_EQ(rates["stages"].back()["name"], "stage 199");
+  EXPECT_EQ(rates["stages"].back()["points"].back()[1],
+            nlohmann::json::parse(live.progress_json())["rate"]);
+  EXPECT_LT(live.rates_json().size(), size_t{512} << 10);
+}
+
 }  // namespace
 }  // namespace voxdag::server
