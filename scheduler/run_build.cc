@@ -13,6 +13,7 @@
 #include "core/io/outputs/guarded_outputs.h"
 #include "core/io/outputs/space_reserve.h"
 #include "scheduler/check_spec.h"
+#include "scheduler/cluster/advice_on_tasks.h"
 #include "scheduler/cluster/cluster.h"
 #include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_report.h"
@@ -401,8 +402,7 @@ std::string advice(const BuildJob& job, ErrorCode code) {
   if (code == ErrorCode::kNoSpace)
     return full_disk_advice(job.store->leaves(), job.spec.geometry.attributes.any());
   if (code == ErrorCode::kCanceled && job.spec.run.cluster)
-    return "; its tasks run on: " + repeat_text() +
-           " to follow them, or stop them with voxdag stop-tasks";
+    return "; its tasks run on: " + advice_on_tasks();
   if (code == ErrorCode::kCanceled) return "; " + repeat_text() + " to resume";
   return "";
 }

@@ -34,8 +34,7 @@ class AttributeCursor {
         [&] { return cursor_.find(cell[0], cell[1], cell[2], job_.selection.grid_levels, i); });
     if (!region)
       throw Error(ErrorCode::kCorrupt, job_.file.path() + ": " + cell_text(job_, cell) +
-                                           " has no " + traits_.name +
-                                           ": the file is damaged (voxdag verify reports where)");
+                                           " has no " + traits_.name + ": " + damage_text());
     if (traits_.encoding == Encoding::kOctahedral && !job_.turn.is_none())
       put_turned(region->normal(i), put);
     else

@@ -122,8 +122,8 @@ void DagExport::require_inside(const CancelToken& cancel) {
   if (!has_inside_ && !has_inside(dag_, cancel))
     throw Error(ErrorCode::kInvalidInput,
                 file_.path() + ": the voxels are a surface without an inside, so " +
-                    option_text("grid", "sdf") +
-                    " has no signs: expected a file of voxdag build --solid RULE, or " +
+                    option_text("grid", "sdf") + " has no signs: expected a file of " +
+                    command_text("build", "solid", "RULE") + ", or " +
                     option_text("grid", "density"));
   has_inside_ = true;
 }

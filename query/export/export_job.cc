@@ -114,6 +114,11 @@ bool CellLimit::fits(uint32_t grid_levels) {
   return voxels <= limit_;
 }
 
+std::string damage_text() {
+  const std::string verify = command_text("verify");
+  return "the file is damaged" + (verify.empty() ? "" : " (" + verify + " reports where)");
+}
+
 void refuse_empty(const ExportJob& job) {
   throw Error(ErrorCode::kInvalidInput, job.file.path() + ": no voxels are selected: expected a " +
                                             option_text("region") + " with voxels");
@@ -123,7 +128,7 @@ void require_written(const ExportJob& job, uint64_t written, uint64_t expected) 
   if (written != expected)
     throw Error(ErrorCode::kCorrupt, job.file.path() + ": " + count_text(written) +
                                          " voxels were found, expected " + count_text(expected) +
-                                         ": the file is damaged (voxdag verify reports where)");
+                                         ": " + damage_text());
 }
 
 voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCursor& colors,
@@ -133,8 +138,7 @@ voxdag_reader::Rgb color_of_cell(const ExportJob& job, voxdag_reader::ColorCurso
       [&] { return colors.color(cell[0], cell[1], cell[2], job.selection.grid_levels); });
   if (!color)
     throw Error(ErrorCode::kCorrupt,
-                job.file.path() + ": " + cell_text(job, cell) +
-                    " has no color: the file is damaged (voxdag verify reports where)");
+                job.file.path() + ": " + cell_text(job, cell) + " has no color: " + damage_text());
   return *color;
 }
 

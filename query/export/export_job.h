@@ -161,6 +161,9 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 // `expected`, the number of voxels in the file's header or from an earlier count.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
 // Returns the name of a cell of the selection's grid, for messages.
+// Returns the end of a message about a damaged file: the command that reports the damage, if the
+// users have one.
+std::string damage_text();
 std::string cell_text(const ExportJob& job, const std::array<int64_t, 3>& cell);
 // Returns the color of a cell of the selected grid. The cell must be set and is in turned axes.
 // Throws Error{kCorrupt} if it has no color.

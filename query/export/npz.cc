@@ -4,6 +4,7 @@
 #include <bit>
 #include <vector>
 
+#include "core/base/options/option_text.h"
 #include "core/format/bytes.h"
 #include "core/image/npy_header.h"
 #include "query/export/attribute_cursor.h"
@@ -231,9 +232,11 @@ std::string add_values(const ExportJob& job, uint64_t voxels, AttributeCursor& a
              [&](const auto& put) {
                visit_cells(job, stage, [&](const Position& cell) { attribute.put(cell, put); });
              });
+  const std::string info = command_text("info", "json");
+  const std::string names =
+      ", indexes of the names" + (info.empty() ? "" : " that " + info + " prints");
   return std::string(", '") + attribute.traits().plural + "' (" + type.name +
-         (attribute.traits().has_names() ? ", indexes of the names that voxdag info --json prints)"
-                                         : ")");
+         (attribute.traits().has_names() ? names : "") + ")";
 }
 
 }  // namespace

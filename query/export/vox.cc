@@ -176,8 +176,7 @@ class VoxWriter {
     if (file.size() != total)
       throw Error(ErrorCode::kCorrupt, job_.file.path() + ": the .vox file has " +
                                            std::to_string(file.size()) + " bytes, expected " +
-                                           std::to_string(total) +
-                                           ": the file is damaged (voxdag verify reports where)");
+                                           std::to_string(total) + ": " + damage_text());
   }
 
  private:

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "core/base/parallel_for.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
@@ -265,12 +266,13 @@ const std::vector<std::string>& DagFile::material_names() const {
 
 namespace {
 
-// A file, and the section of the file that stores an attribute. `expected` describes a file with
-// the attribute, for the error message if this file does not have the attribute.
+// A file, and the section of the file that stores an attribute. `values` names the values of the
+// attribute, and `option` and `value` are the option of builds that computes it, for the error
+// message if this file does not have the attribute.
 struct AttributeSource {
   const voxdag_reader::File& file;
   const voxdag_reader::ColorSection& section;
-  const char* expected;
+  const char *values, *option, *value;
 };
 
 // Sets values[i] to the attribute of the cell points[i], or to `none` if the cell is not set.
@@ -282,7 +284,9 @@ void read_attribute(const AttributeSource& source, std::span<const Position> poi
                     const ValueOf& value_of) {
   require_length("results", values.size(), points.size(), "points");
   if (source.section.tier_count() == 0)
-    refuse(source.file.path() + " does not have this attribute: expected " + source.expected);
+    refuse(source.file.path() + " does not have this attribute: expected a file with " +
+           source.values + ", as " + command_text("build", source.option, source.value) +
+           " makes it");
   with_reader_errors([&] {
     for_each_batch(threads, points.size(), [&](size_t first, size_t count) {
       voxdag_reader::ColorCursor cursor(source.file, source.section);
@@ -301,9 +305,8 @@ void read_attribute(const AttributeSource& source, std::span<const Position> poi
 void DagFile::colors(std::span<const Position> points, uint32_t grid_levels, std::span<Rgba> colors,
                      unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
-  read_attribute({file(), file().colors(), "a file with colors, as voxdag build --color makes it"},
-                 points, grid_levels, Rgba{}, colors, threads,
-                 [](const voxdag_reader::ColorRegion& region, uint64_t number) {
+  read_attribute({file(), file().colors(), "colors", "color", ""}, points, grid_levels, Rgba{},
+                 colors, threads, [](const voxdag_reader::ColorRegion& region, uint64_t number) {
                    const voxdag_reader::Rgb color = region.color(number);
                    return Rgba{color.r, color.g, color.b, 255};
                  });
@@ -312,20 +315,18 @@ void DagFile::colors(std::span<const Position> points, uint32_t grid_levels, std
 void DagFile::alphas(std::span<const Position> points, uint32_t grid_levels,
                      std::span<uint8_t> alphas, unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
-  read_attribute(
-      {file(), file().alphas(), "a file with alpha, as voxdag build --attributes alpha makes it"},
-      points, grid_levels, uint8_t{0}, alphas, threads,
-      [](const voxdag_reader::ColorRegion& region, uint64_t number) {
-        return static_cast<uint8_t>(region.value(number));
-      });
+  read_attribute({file(), file().alphas(), "alpha", "attributes", "alpha"}, points, grid_levels,
+                 uint8_t{0}, alphas, threads,
+                 [](const voxdag_reader::ColorRegion& region, uint64_t number) {
+                   return static_cast<uint8_t>(region.value(number));
+                 });
 }
 
 void DagFile::normals(std::span<const Position> points, uint32_t grid_levels,
                       std::span<Normal> normals, unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
-  read_attribute({file(), file().normals(),
-                  "a file with normals, as voxdag build --attributes normal makes it"},
-                 points, grid_levels, Normal{}, normals, threads,
+  read_attribute({file(), file().normals(), "normals", "attributes", "normal"}, points, grid_levels,
+                 Normal{}, normals, threads,
                  [](const voxdag_reader::ColorRegion& region, uint64_t number) {
                    const voxdag_reader::Normal normal = region.normal(number);
                    return Normal{normal.x, normal.y, normal.z};
@@ -335,9 +336,8 @@ void DagFile::normals(std::span<const Position> points, uint32_t grid_levels,
 void DagFile::materials(std::span<const Position> points, uint32_t grid_levels,
                         std::span<uint32_t> materials, unsigned threads) const {
   check_grid_levels(state_->view, grid_levels);
-  read_attribute({file(), file().materials(),
-                  "a file with materials, as voxdag build --attributes material makes it"},
-                 points, grid_levels, kNoMaterial, materials, threads,
+  read_attribute({file(), file().materials(), "materials", "attributes", "material"}, points,
+                 grid_levels, kNoMaterial, materials, threads,
                  [](const voxdag_reader::ColorRegion& region, uint64_t number) {
                    return region.value(number);
                  });

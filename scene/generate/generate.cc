@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/error.h"
+#include "core/base/options/option_text.h"
 #include "scene/generate/glb_layout.h"
 #include "scene/generate/glb_writer.h"
 #include "scene/generate/scene_builder.h"
@@ -49,21 +50,23 @@ void check(const GenerateOptions& options) {
   const std::string name = scene_kind(options.kind).name;
   const bool has_parts = options.kind == SceneKind::kCity || options.kind == SceneKind::kSpheres;
   if (options.instances && !has_parts)
-    throw Error(ErrorCode::kInvalidInput, "a scene of the kind " + name +
-                                              " has no repeated parts, so --instances is not "
-                                              "possible: expected the kind city or spheres");
-  if (options.colors && scene_kind(options.kind).materials.empty())
-    throw Error(ErrorCode::kInvalidInput, "a scene of the kind " + name +
-                                              " cannot have colors: expected the kind city, or no "
-                                              "--colors");
-  if (options.colors && options.instances)
     throw Error(ErrorCode::kInvalidInput,
-                "--colors and --instances were both given, but all instances of a part would have "
-                "the same colors: expected only one of the two");
+                "a scene of the kind " + name + " has no repeated parts, so " +
+                    option_text("instances") +
+                    " is not possible: expected the kind city or spheres");
+  if (options.colors && scene_kind(options.kind).materials.empty())
+    throw Error(ErrorCode::kInvalidInput,
+                "a scene of the kind " + name +
+                    " cannot have colors: expected the kind city, or no " + option_text("colors"));
+  if (options.colors && options.instances)
+    throw Error(ErrorCode::kInvalidInput, option_text("colors") + " and " +
+                                              option_text("instances") +
+                                              " were both given, but all instances of a part would "
+                                              "have the same colors: expected only one of the two");
   if (options.kind == SceneKind::kMenger && options.triangles != 0)
-    throw Error(ErrorCode::kInvalidInput, "menger has no number of triangles, but --triangles is " +
-                                              std::to_string(options.triangles) +
-                                              ": expected --level");
+    throw Error(ErrorCode::kInvalidInput,
+                "menger has no number of triangles, but " + option_text("triangles") + " is " +
+                    std::to_string(options.triangles) + ": expected " + option_text("level"));
   check_size(options);
 }
 

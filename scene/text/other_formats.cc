@@ -19,13 +19,23 @@ constexpr size_t kFirstBytes = 4096;
 constexpr const char* kUnpack = "unpack it first";
 constexpr const char* kConvert = "convert it first, for example with Blender";
 #ifdef VOXDAG_HAS_ASSIMP
-constexpr const char* kImport = "convert it first: voxdag import IN OUT.glb";
-constexpr const char* kUnpackOrImport =
-    "unpack it first, or convert a 3MF file: voxdag import IN OUT.glb";
+constexpr bool kCanImport = true;
 #else
-constexpr const char* kImport = kConvert;
-constexpr const char* kUnpackOrImport = kConvert;
+constexpr bool kCanImport = false;
 #endif
+// Stand for remedy_text().
+constexpr const char* kImport = "import";
+constexpr const char* kUnpackOrImport = "unpack or import";
+
+// Returns the advice that the message about a format ends with. Names voxdag import if the users
+// have this command.
+std::string remedy_text(std::string_view remedy) {
+  if (remedy != kImport && remedy != kUnpackOrImport) return std::string(remedy);
+  const std::string import = kCanImport ? command_text("import") : "";
+  if (import.empty()) return kConvert;
+  return (remedy == kImport ? "convert it first: " : "unpack it first, or convert a 3MF file: ") +
+         import + " IN OUT.glb";
+}
 
 // A file format that voxdag does not read but recognizes, to name it in the error message. Its
 // files have `bytes` at `offset`. `remedy` is advice for the user. Image formats are not in this
@@ -147,8 +157,8 @@ bool is_tar_header(std::string_view begin) {
 std::string contents_of_markup(std::string_view text) {
   std::string small(text);
   for (char& c : small) c = lower(c);
-  if (small.find("<collada") != small.npos) return std::string("a COLLADA file: ") + kImport;
-  if (small.find("<x3d") != small.npos) return std::string("an X3D file: ") + kImport;
+  if (small.find("<collada") != small.npos) return "a COLLADA file: " + remedy_text(kImport);
+  if (small.find("<x3d") != small.npos) return "an X3D file: " + remedy_text(kImport);
   if (small.find("<html") != small.npos || small.starts_with("<!doctype html"))
     return "a web page, perhaps the error page of a failed download";
   return "an XML file";
@@ -231,7 +241,8 @@ std::string describe_other_format(std::string_view begin) {
   }
   for (const KnownFormat& known : kKnown)
     if (matches(known, begin))
-      return "is " + std::string(known.name) + (*known.remedy ? ": " : "") + known.remedy;
+      return "is " + std::string(known.name) + (*known.remedy ? ": " : "") +
+             remedy_text(known.remedy);
   if (is_tar_header(begin)) return std::string("is a tar archive: ") + kUnpack;
   return describe_text(without_leading_space(begin));
 }

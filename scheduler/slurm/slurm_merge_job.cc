@@ -8,6 +8,7 @@
 #include "core/base/options/option_text.h"
 #include "core/format/checksum.h"
 #include "scene/formats/formats.h"
+#include "scheduler/cluster/advice_on_tasks.h"
 #include "scheduler/cluster/cluster.h"
 #include "scheduler/slurm/cluster_context.h"
 #include "scheduler/slurm/files/cluster_folder.h"
@@ -180,9 +181,8 @@ BuildReport SlurmMergeJob::follow(const std::string& submitted) {
       }
     }
     if (context_.cancel.canceled())
-      throw Error(ErrorCode::kCanceled, "canceled; job " + id +
-                                            " and its tasks run on: " + repeat_text() +
-                                            " to follow them, or stop them with voxdag stop-tasks");
+      throw Error(ErrorCode::kCanceled,
+                  "canceled; job " + id + " and its tasks run on: " + advice_on_tasks());
     std::this_thread::sleep_for(
         std::chrono::duration<double>(std::min(kFilesPauseS, options_.slurm_interval_s)));
   }

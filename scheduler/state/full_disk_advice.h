@@ -23,7 +23,10 @@ inline std::string full_disk_advice(std::span<const StoredSubvolume> leaves, boo
   if (built > 0 && bytes > 0) {
     const double artifacts = bytes * (1 + planned / built);
     needed = "about " + size_text(static_cast<uint64_t>(2 * artifacts - bytes)) + " of ";
-    if (has_colors) needed = "the space for colors (a plan estimates it) and " + needed;
+    const std::string plan = command_text("plan");
+    if (has_colors)
+      needed = "the space for colors (" + (plan.empty() ? "a plan" : plan) + " estimates it) and " +
+               needed;
   }
   return "; the finished work is kept: free " + needed + "disk space and " + repeat_text();
 }

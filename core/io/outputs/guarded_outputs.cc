@@ -9,7 +9,7 @@ namespace {
 [[noreturn]] void refuse_to_replace(const std::string& path) {
   throw Error(ErrorCode::kInvalidInput,
               path +
-                  " was created or changed by another program during this command, so it is kept: "
+                  " was created or changed by another program in the meantime, so it is kept: "
                   "expected a free name; move the file and " +
                   repeat_text());
 }

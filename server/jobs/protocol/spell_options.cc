@@ -43,4 +43,11 @@ std::string spell_export_option(std::string_view name, std::string_view value) {
   return name == "memory" ? setting("exports.memory") : spell_as_member(name, value);
 }
 
+std::string spell_request(std::string_view command, std::string_view option,
+                          std::string_view value) {
+  if (command == "plan") return "a request with dry_run=true";
+  if (command != "build") return "";
+  return option.empty() ? "a job" : "a job with " + spell_as_member(option, value);
+}
+
 }  // namespace voxdag::server

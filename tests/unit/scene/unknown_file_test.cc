@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/support/audience_guard.h"
 #include "tests/unit/scene/scene_files.h"
 
 namespace voxdag {
@@ -108,6 +109,18 @@ TEST(UnknownFile, OtherTextsAreNotPoints) {
   EXPECT_EQ(error_of_text("OFFSET,x,y,z\n9,1,2,3\n").message(), "");
   EXPECT_EQ(error_of_text("MM,x,y,z\n9,1,2,3\n").message(), "");
 }
+
+#ifdef VOXDAG_HAS_ASSIMP
+TEST(UnknownFile, OnlyUsersOfTheProgramCanImport) {
+  const auto message = [](const Audience& audience) {
+    const test::AudienceGuard guard(audience);
+    return error_of_text("OFF\n8 6 0\n").message();
+  };
+  EXPECT_THAT(message(kCommandLineUsers), HasSubstr("convert it first: voxdag import IN OUT.glb"));
+  EXPECT_THAT(message(kPythonUsers), HasSubstr("the shell command voxdag import IN OUT.glb"));
+  EXPECT_THAT(message(test::kOtherUsers), HasSubstr("for example with Blender"));
+}
+#endif
 
 // A file is read as glTF if it begins with the signature of a GLB or with JSON. White space or a
 // byte order mark can precede the JSON.

@@ -25,11 +25,23 @@ TEST(OptionTextTest, SpellsKeywordsOfPython) {
   EXPECT_EQ(spell_as_keyword("grid", "mask"), "grid=\"mask\"");
 }
 
+TEST(OptionTextTest, SpellsCommands) {
+  EXPECT_EQ(command_text("verify"), "voxdag verify");
+  EXPECT_EQ(command_text("build", "color"), "voxdag build --color");
+  EXPECT_EQ(command_text("build", "solid", "winding"), "voxdag build --solid winding");
+  EXPECT_EQ(spell_python_call("plan", "", ""), "voxdag.plan()");
+  EXPECT_EQ(spell_python_call("build", "color", ""), "voxdag.build(color=True)");
+  EXPECT_EQ(spell_python_call("reorder", "order", "hash"), "voxdag.reorder(order=\"hash\")");
+  EXPECT_EQ(spell_python_call("verify", "", ""), "the shell command voxdag verify");
+  EXPECT_EQ(spell_python_call("info", "json", ""), "the shell command voxdag info --json");
+}
+
 TEST(OptionTextTest, WordsFollowTheAudience) {
   EXPECT_EQ(repeat_text(), "run the same command again");
   set_audience(kPythonUsers);
   EXPECT_EQ(option_text("level"), "level");
   EXPECT_EQ(repeat_text(), "make the same call again");
+  EXPECT_EQ(command_text("plan"), "voxdag.plan()");
   set_audience(kCommandLineUsers);
   EXPECT_EQ(option_text("level"), "--level");
 }

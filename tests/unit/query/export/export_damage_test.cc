@@ -8,6 +8,8 @@
 #include "core/base/error.h"
 #include "core/format/global/open_global.h"
 #include "query/export/export.h"
+#include "query/export/export_job.h"
+#include "tests/support/audience_guard.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/query/export/corners.h"
 
@@ -69,6 +71,16 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
     refused += is_refused(path);
   }
   EXPECT_GT(refused, 5);
+}
+
+TEST(DamageTextTest, NamesTheCommandOfEachAudience) {
+  EXPECT_EQ(damage_text(), "the file is damaged (voxdag verify reports where)");
+  {
+    const test::AudienceGuard python(kPythonUsers);
+    EXPECT_EQ(damage_text(), "the file is damaged (the shell command voxdag verify reports where)");
+  }
+  const test::AudienceGuard others(test::kOtherUsers);
+  EXPECT_EQ(damage_text(), "the file is damaged");
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, ExportDamage,

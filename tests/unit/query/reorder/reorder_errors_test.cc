@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "query/combine/combine.h"
+#include "tests/support/audience_guard.h"
 #include "tests/support/error_of.h"
 #include "tests/support/faulty_files.h"
 #include "tests/support/killed.h"
@@ -121,6 +122,15 @@ TEST_F(Reorder, CombineNeedsTheOrderByHash) {
     EXPECT_NE(error.message().find("expected the order hash, which voxdag reorder --order hash"),
               std::string::npos)
         << error.message();
+  }
+  {
+    const test::AudienceGuard python(kPythonUsers);
+    EXPECT_TRUE(refused(*a2, *b).message().ends_with(
+        "expected the order hash, which voxdag.reorder(order=\"hash\") writes"));
+  }
+  {
+    const test::AudienceGuard others(test::kOtherUsers);
+    EXPECT_TRUE(refused(*a2, *b).message().ends_with("expected the order hash"));
   }
   combined.offset = {0, 0, 0};
   combine(*a, *b, combined, system_files(), progress_, never_);

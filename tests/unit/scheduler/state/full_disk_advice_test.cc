@@ -2,12 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <vector>
+
+#include "tests/support/audience_guard.h"
 
 namespace voxdag {
 namespace {
-
-constexpr Audience kTestUsers{&spell_as_member, "retry the job"};
 
 std::vector<StoredSubvolume> half_built() {
   std::vector<StoredSubvolume> subvolumes(2);
@@ -27,13 +28,17 @@ TEST(FullDiskAdviceTest, EstimatesTheMissingSpace) {
 }
 
 TEST(FullDiskAdviceTest, SaysHowTheUsersOfTheProcessResume) {
-  set_audience(kTestUsers);
-  const std::string advice = full_disk_advice(half_built(), true);
-  set_audience(kCommandLineUsers);
-  EXPECT_EQ(
-      advice,
-      "; the finished work is kept: free the space for colors (a plan estimates it) and about "
-      "3.00 MiB of disk space and retry the job");
+  const auto advice = [](const Audience& audience) {
+    const test::AudienceGuard guard(audience);
+    return full_disk_advice(half_built(), true);
+  };
+  const auto expected = [](const std::string& plan, const std::string& repeat) {
+    return "; the finished work is kept: free the space for colors (" + plan +
+           " estimates it) and about 3.00 MiB of disk space and " + repeat;
+  };
+  EXPECT_EQ(advice(kCommandLineUsers), expected("voxdag plan", "run the same command again"));
+  EXPECT_EQ(advice(kPythonUsers), expected("voxdag.plan()", "make the same call again"));
+  EXPECT_EQ(advice(test::kOtherUsers), expected("a plan", "try again"));
 }
 
 }  // namespace

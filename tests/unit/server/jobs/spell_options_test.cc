@@ -24,6 +24,14 @@ TEST(SpellOptionsTest, TheServiceReplacesOtherOptions) {
   EXPECT_EQ(spell_job_option("cluster_options", ""), "cluster.options of the service");
 }
 
+TEST(SpellOptionsTest, CommandsAreRequests) {
+  EXPECT_EQ(spell_request("build", "color", ""), "a job with 'color'");
+  EXPECT_EQ(spell_request("build", "solid", "winding"), "a job with \"solid\": \"winding\"");
+  EXPECT_EQ(spell_request("plan", "", ""), "a request with dry_run=true");
+  for (const char* command : {"stop-tasks", "verify", "reorder", "import", "info"})
+    EXPECT_EQ(spell_request(command, "", ""), "") << command;
+}
+
 // No message names an option of `voxdag build` that requests cannot have.
 struct ExpectMembersOfJobs {
   template <class T>
