@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/host_device.h"
 #include "core/color/color_of.h"
 
 namespace voxdag {
@@ -93,6 +94,52 @@ EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const Co
   RegionEncoder encoder(levels, color);
   encoder.add(cells);
   return encoder.finish(morton);
+}
+
+namespace {
+
+// Returns the cells of the next coarser level, in the same form as `cells` (encode_flat_region()).
+std::vector<uint64_t> parents_of(std::span<const uint64_t> cells) {
+  std::vector<uint64_t> parents((cells.size() + 7) / 8);
+  for (size_t i = 0; i < cells.size(); ++i) {
+    if (cells[i] == 0) continue;
+    uint64_t any = cells[i] | cells[i] >> 4;
+    any |= any >> 2;
+    any = (any | any >> 1) & 0x0101010101010101;
+    // The product has bit 8 k of `any`, the parent of the cells 8 k to 8 k + 7, at bit 56 + k.
+    parents[i / 8] |= (any * 0x0102040810204080) >> 56 << i % 8 * 8;
+  }
+  return parents;
+}
+
+}  // namespace
+
+EncodedRegion encode_flat_region(uint32_t levels, uint64_t morton, std::span<const uint64_t> cells,
+                                 const FlatColor& color, uint64_t weight) {
+  EncodedRegion region;
+  region.morton = morton;
+  color.add_to(region.total, weight);
+  constexpr size_t kPrefixWords = (size_t{1} << 3 * kPrefixLevels) / 64;
+  uint64_t all = 0;
+  std::vector<uint64_t> coarser;
+  for (uint32_t up = 0; up <= levels; ++up) {
+    uint32_t& count = region.counts[up];
+    for (size_t at = 0; at < cells.size(); at += kPrefixWords) {
+      const uint32_t before = count;
+      for (const uint64_t word : cells.subspan(at, std::min(kPrefixWords, cells.size() - at)))
+        if (word != 0) count += static_cast<uint32_t>(popcount64(word));
+      if (up + kPrefixLevels < levels && count != before) region.prefix.push_back(before);
+    }
+    all += count;
+    coarser = parents_of(cells);
+    cells = coarser;
+  }
+  const Color stored = color_of(region.total);
+  const ColorBlock block = fastest_block_encoder()(&stored, 1);
+  region.blocks.reserve((all + kBlockCells - 1) / kBlockCells * kBlockBytes);
+  for (uint64_t at = 0; at < all; at += kBlockCells)
+    region.blocks.insert(region.blocks.end(), block.begin(), block.end());
+  return region;
 }
 
 }  // namespace voxdag

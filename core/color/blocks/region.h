@@ -86,6 +86,14 @@ class RegionEncoder {
 EncodedRegion encode_region(uint32_t levels, uint64_t morton, std::span<const ColoredCell> cells,
                             const CellColor& color = nullptr);
 
+// Encodes a region in which all surfaces have the flat color `color`. The result equals the result
+// of encode_region() for the sums of the cells. `cells` has a bit for each cell of the finest
+// level: bit i % 64 of element i / 64 is set if the cell with the Morton code i is set. At least
+// one cell must be set. `weight` is the sum of the weights of all surfaces in all cells, below
+// 2^40.
+EncodedRegion encode_flat_region(uint32_t levels, uint64_t morton, std::span<const uint64_t> cells,
+                                 const FlatColor& color, uint64_t weight);
+
 // Returns the number of entries of EncodedRegion::prefix for a region with these counts.
 inline size_t prefix_entries(uint32_t levels,
                              const std::array<uint32_t, kRegionLevels + 1>& counts) {

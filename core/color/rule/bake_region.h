@@ -16,7 +16,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -28,13 +27,11 @@
 #include "core/color/rule/closest_point.h"
 #include "core/color/rule/color_grid.h"
 #include "core/color/rule/covered_surface.h"
+#include "core/color/rule/region_box.h"
 #include "core/color/rule/region_cells.h"
 #include "core/color/rule/surface_look.h"
-#include "core/color/rule/touched_cells.h"
 #include "core/color/surface.h"
 #include "core/geometry/cube.h"
-#include "core/geometry/morton.h"
-#include "core/geometry/octree_descent.h"
 
 namespace voxdag {
 
@@ -57,11 +54,13 @@ class RegionBaker {
   // Material::number.
   RegionBaker(const ColorGrid& grid, std::span<const Material> materials, Textures& textures,
               const AttributeSet& wanted = {}, const Cutouts* cutouts = nullptr)
-      : grid_(grid), materials_(materials), textures_(textures), cutouts_(cutouts), cells_(wanted) {
+      : grid_(grid),
+        materials_(materials),
+        textures_(textures),
+        cutouts_(cutouts),
+        region_(grid),
+        cells_(wanted) {
     waiting_.reserve(kMaxWaiting);
-    for (int a = 0; a < 3; ++a)
-      for (uint32_t k = 0; k < 64; ++k)
-        spread_[a][k] = static_cast<uint32_t>(spread_bits3(k) << (2 - a));
   }
 
   // `region`: a cube of at most 64^3 color cells. `triangles`: at most 2^32 triangles, which
@@ -79,11 +78,7 @@ class RegionBaker {
   void begin(const Cube& region, uint32_t max_cells = color::RegionCells::kMaxCells) {
     max_cells_ = max_cells;
     cells_.reserve(std::min(max_cells + kTriangleCells, color::RegionCells::kMaxCells));
-    const uint32_t down = grid_.color_levels - region.level;
-    for (int a = 0; a < 3; ++a) {
-      first_[a] = static_cast<int64_t>(region.position[a]) << down;
-      last_[a] = first_[a] + (int64_t{1} << down) - 1;
-    }
+    region_.move_to(region);
   }
   // Returns false if the region now has more than `max_cells` cells; it then has at most max_cells
   // + kTriangleCells cells. finish() must still be called in this case, but its result is
@@ -134,30 +129,16 @@ class RegionBaker {
 
   void add_triangle(uint32_t index) {
     const FixedTriangle& triangle = triangles_[index].position;
-    const CellBox box(triangle, grid_.levels, grid_.color_levels);
-    for (int a = 0; a < 3; ++a)
-      if (box.high[a] < first_[a] || box.low[a] > last_[a]) return;
-    if (box.low[0] == box.high[0] && box.low[1] == box.high[1] && box.low[2] == box.high[2] &&
-        !may_cover(triangle)) {
+    const CellBox box = region_.cells_of(triangle);
+    if (!region_.overlaps(box)) return;
+    if (region_.is_tiny(triangle, box)) {
       const auto part = visible_part(triangles_[index]);
-      if (!part || part->is_visible_in(cell_at(box.low))) wait(index, code_of(box.low));
+      if (!part || part->is_visible_in(cell_at(box.low))) wait(index, region_.code_of(box.low));
     } else if (color::is_narrow(triangle)) {
       add_in<int64_t>(index, box);
     } else {
       add_in<int128>(index, box);
     }
-  }
-
-  // Returns false if the triangle cannot cover a column, which is the case for most tiny triangles.
-  // A column is a line with fixed coordinates along two axes. So along at least two axes, the
-  // triangle's box must contain a coordinate of a column.
-  bool may_cover(const FixedTriangle& triangle) const {
-    const int bits = grid_.cell_bits() - 2;
-    const int64_t half = int64_t{1} << (bits - 1);
-    int axes = 0;
-    for (int a = 0; a < 3; ++a)
-      axes += (triangle.low(a) + half - 1) >> bits != (triangle.high(a) + half) >> bits;
-    return axes >= 2;
   }
 
   // Adds a triangle to the cells in which it covers columns. Cells are collected in a batch, so
@@ -178,11 +159,15 @@ class RegionBaker {
     }
     void flush() {
       if (collected_ == 0) return;
-      if (!look_) {
-        look_.emplace(surface_, baker_.materials_[surface_.material], baker_.textures_,
-                      triangle_.cell_bits, triangle_.area, baker_.has_mask(surface_.material));
-        flat_ = look_->flat_color();
-        if (flat_) flat_index_ = baker_.cells_.index_of(*flat_);
+      if (!look_ && !flat_) {
+        const Material& material = baker_.materials_[surface_.material];
+        const bool is_cut = baker_.has_mask(surface_.material);
+        flat_ = color::flat_color_of(surface_, material, is_cut);
+        if (flat_)
+          flat_index_ = baker_.cells_.index_of(*flat_);
+        else
+          look_.emplace(surface_, material, baker_.textures_, triangle_.cell_bits, triangle_.area,
+                        is_cut);
       }
       const auto batch = std::span(batch_).first(collected_);
       if (flat_)
@@ -230,9 +215,9 @@ class RegionBaker {
     const FixedSurface& surface_;
     const color::CellTriangle<Int>& triangle_;
     const color::CoveredSurface<Int> covered_;
-    std::optional<color::SurfaceLook<Textures>> look_;
-    std::optional<FlatColor> flat_;  // the color, if it is flat
-    uint32_t flat_index_ = 0;        // index_of() this color in RegionCells
+    std::optional<FlatColor> flat_;                     // the color, if it is flat
+    uint32_t flat_index_ = 0;                           // index_of() this color in RegionCells
+    std::optional<color::SurfaceLook<Textures>> look_;  // set if the color is not flat
     std::optional<color::SurfaceFacing> facing_;
     Cell batch_[kBatch];
     size_t collected_ = 0;
@@ -242,34 +227,19 @@ class RegionBaker {
   void add_in(uint32_t index, const CellBox& box) {
     const FixedSurface& surface = triangles_[index];
     const color::CellTriangle<Int> triangle(surface.position, grid_.cell_bits());
-    color::CellRange range;
-    const uint32_t* spread[3];
-    int64_t low[3];
-    for (int d = 0; d < 3; ++d) {
-      const int a = triangle.axis[d];
-      range.first[d] = std::max(box.low[a], first_[a]);
-      range.last[d] = std::min(box.high[a], last_[a]);
-      spread[d] = spread_[a];
-      low[d] = first_[a];
-    }
     CoveredCells<Int> covered(*this, surface, triangle);
     const std::optional<VisiblePart> part = visible_part(surface);
-    color::TouchedCells<Int>(triangle, range)
-        .visit([&](int64_t p, int64_t q, int64_t r, uint32_t columns) {
-          if (part) {
-            int64_t cell[3];
-            cell[triangle.axis[0]] = p;
-            cell[triangle.axis[1]] = q;
-            cell[triangle.axis[2]] = r;
-            if (!part->is_visible_in(cell_at(cell))) return;
-          }
-          const uint32_t code =
-              spread[0][p - low[0]] | spread[1][q - low[1]] | spread[2][r - low[2]];
-          if (columns == 0)
-            wait(index, code);
-          else
-            covered.add(p, q, columns, code);
-        });
+    region_.visit(triangle, box, [&](const int64_t(&at)[3], uint32_t columns, uint32_t code) {
+      if (part) {
+        int64_t cell[3];
+        for (int d = 0; d < 3; ++d) cell[triangle.axis[d]] = at[d];
+        if (!part->is_visible_in(cell_at(cell))) return;
+      }
+      if (columns == 0)
+        wait(index, code);
+      else
+        covered.add(at[0], at[1], columns, code);
+    });
     covered.flush();
   }
 
@@ -295,8 +265,9 @@ class RegionBaker {
       }
       last = waiting.triangle;
       const uint32_t cell = cells_.touch(waiting.code);
-      look->add(look->spot_at(color::closest_point(surface.position, center_of(waiting.code))), 1,
-                cells_.sum(cell));
+      look->add(
+          look->spot_at(color::closest_point(surface.position, region_.center_of(waiting.code))), 1,
+          cells_.sum(cell));
       if (cells_.attributes().is_needed()) cells_.attributes().add(cell, facing, 1, 1);
     }
     waiting_.clear();
@@ -318,28 +289,14 @@ class RegionBaker {
             {static_cast<uint32_t>(position[0]), static_cast<uint32_t>(position[1]),
              static_cast<uint32_t>(position[2])}};
   }
-  uint32_t code_of(const int64_t (&position)[3]) const {
-    return spread_[0][position[0] - first_[0]] | spread_[1][position[1] - first_[1]] |
-           spread_[2][position[2] - first_[2]];
-  }
-  // Returns the center of a cell in lattice units (1/256 voxel).
-  std::array<int64_t, 3> center_of(uint32_t code) const {
-    uint32_t at[3];
-    morton_decode(code, at[0], at[1], at[2]);
-    std::array<int64_t, 3> center;
-    for (size_t a = 0; a < 3; ++a)
-      center[a] = (2 * (first_[a] + at[a]) + 1) << (grid_.cell_bits() - 1);
-    return center;
-  }
 
   const ColorGrid grid_;
   const std::span<const Material> materials_;
   Textures& textures_;
   const Cutouts* const cutouts_;
-  uint32_t spread_[3][64];  // [axis][coordinate]: the coordinate's bits in a Morton code
   std::span<const FixedSurface> triangles_;
   uint32_t max_cells_ = 0;
-  int64_t first_[3] = {}, last_[3] = {};  // range of the region's cells, by axis
+  color::RegionBox region_;
   color::RegionCells cells_;
   std::vector<Waiting> waiting_;
   std::vector<CellValues> values_;  // values that finish(cells) discards

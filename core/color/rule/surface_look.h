@@ -8,6 +8,7 @@
 #include "core/base/host_device.h"
 #include "core/base/integers.h"
 #include "core/color/color_sum.h"
+#include "core/color/cutouts/hidden.h"
 #include "core/color/rule/exact.h"
 #include "core/color/rule/texture_lookup.h"
 #include "core/color/surface.h"
@@ -126,6 +127,29 @@ VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, 
 #endif
 }
 
+// Returns the alpha, 0 to 255, of a surface whose texture and tint give `alpha`, which is 0 to
+// 65535. `is_cut` is explained at SurfaceLook. If it is set, the alpha of the mode kMask is always
+// 255, because the mask of the cutouts has already excluded hidden texels.
+VOXDAG_HD inline uint32_t surface_alpha(const Material& material, uint32_t alpha, bool is_cut) {
+  return is_cut && material.alpha_mode == AlphaMode::kMask ? 255 : alpha_by_mode(material, alpha);
+}
+
+// Returns the color of all points of a surface, if they have the same: the surface has no image,
+// and its corners have equal colors. `is_cut` is explained at SurfaceLook.
+VOXDAG_HD inline std::optional<FlatColor> flat_color_of(const FixedSurface& surface,
+                                                        const Material& material,
+                                                        bool is_cut = false) {
+  const auto& corners = surface.corners;
+  if (material.image != Material::kNoImage || corners[0].color != corners[1].color ||
+      corners[0].color != corners[2].color)
+    return std::nullopt;
+  const auto channel_of = [&](size_t c) { return scaled(material.factor[c], corners[0].color[c]); };
+  FlatColor color;
+  for (size_t c = 0; c < 3; ++c) color.rgb[c] = static_cast<uint16_t>(channel_of(c));
+  color.alpha = static_cast<uint8_t>(surface_alpha(material, channel_of(3), is_cut));
+  return color;
+}
+
 // Adds the color of a triangle to the sums of the cells that it touches. The surface, the material
 // and the textures must outlive this object.
 template <class Textures>
@@ -172,18 +196,6 @@ class SurfaceLook {
     return spot;
   }
 
-  // Returns the color of all points, if they have the same: the surface has no image, and its
-  // corners have equal colors.
-  VOXDAG_HD std::optional<FlatColor> flat_color() const {
-    if (view_ || !one_tint_) return std::nullopt;
-    const Texel texel = tinted(~Texel{0}, tint_);
-    FlatColor color;
-    for (int c = 0; c < 3; ++c)
-      color.rgb[static_cast<size_t>(c)] = static_cast<uint16_t>(channel(texel, c));
-    color.alpha = static_cast<uint8_t>(alpha_of(channel(texel, 3)));
-    return color;
-  }
-
   // Adds the color at a spot to `sum` with `weight`, which is less than 2^24.
   VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
     Texel texel = ~Texel{0};
@@ -192,7 +204,7 @@ class SurfaceLook {
       if (!one_tint_) set_tint(spot.point);
       texel = tinted(texel, tint_);
     }
-    add_weighted(texel, weight, weight * alpha_of(channel(texel, 3)), sum);
+    add_weighted(texel, weight, weight * surface_alpha(material_, channel(texel, 3), is_cut_), sum);
   }
 
  private:
@@ -239,16 +251,6 @@ class SurfaceLook {
           (static_cast<int128>(second) * point.second + static_cast<int128>(third) * point.third) >>
           kPointBits);
     return corners_[0].texture[static_cast<size_t>(a)] + change;
-  }
-
-  // Returns the alpha, 0 to 255, that the material's alpha mode makes of `alpha`, which is 0 to
-  // 65535. If `is_cut` is set, the mode kMask always gives 255, because the mask of the cutouts has
-  // already excluded hidden texels.
-  VOXDAG_HD uint32_t alpha_of(uint32_t alpha) const {
-    if (material_.alpha_mode == AlphaMode::kOpaque) return 255;
-    if (material_.alpha_mode == AlphaMode::kMask)
-      return is_cut_ || alpha >= material_.alpha_cutoff ? 255 : 0;
-    return (alpha * 255 + 32768) >> 16;
   }
 
   static constexpr int64_t kNear = int64_t{1} << 32;

@@ -7,6 +7,9 @@
 // of the column that its plane touches. If the shadow only touches the square, the edge tests in
 // the other two projections also decide.
 //
+// If the plane hardly rises along a row, it touches the same single cell in many consecutive
+// columns of cells. A short loop without other tests visits such a run.
+//
 // From one column of cells to the next, the plane rises or falls by at most one cell. So the
 // plane's height is updated by additions. In the first column of a row the height is estimated in
 // doubles, and the estimate is corrected with exact values.
@@ -33,6 +36,7 @@ class TouchedCells {
       : t_(triangle), range_(range) {
     for (int i = 0; i < 3; ++i)
       margin_[i] = magnitude(t_.edges[2][i].a) + magnitude(t_.edges[2][i].b);
+    is_level_ = 4 * magnitude(t_.normal[1]) <= t_.normal[2];
     rise_ = positive_part(t_.normal[0]) + positive_part(t_.normal[1]);
     fall_ = negative_part(t_.normal[0]) + negative_part(t_.normal[1]);
   }
@@ -53,17 +57,55 @@ class TouchedCells {
       at[i] = e.a * p + e.b * range_.first[1] + e.touch;
     }
     bool following = false;
-    for (int64_t q = range_.first[1]; q <= range_.last[1]; ++q) {
+    for (int64_t q = range_.first[1]; q <= range_.last[1];) {
       const bool touched = (at[0] | at[1] | at[2]) >= 0;
       if (touched) {
         following ? climb() : find_plane(p, q);
+        if (is_level_ && first_ == last_ && is_inside(at)) {
+          following = true;
+          q = visit_run(p, q, at, visit);
+          continue;
+        }
         visit_column(p, q, at, visit);
       } else if (following) {
         return;  // the shadow is convex, so it touches no later square of the row
       }
       following = touched;
+      ++q;
       for (int i = 0; i < 3; ++i) at[i] += t_.edges[2][i].b;
     }
+  }
+
+  // True if the shadow contains the closed square for which the edge functions have the maxima
+  // `at`.
+  VOXDAG_HD bool is_inside(const Int (&at)[3]) const {
+    return !t_.degenerate &&
+           ((at[0] - margin_[0]) | (at[1] - margin_[1]) | (at[2] - margin_[2])) >= 0;
+  }
+
+  // Visits the column of cells (p, q) and the following ones of the row, as long as the shadow
+  // contains their squares and the plane touches only the cell first_. This must be the case for
+  // (p, q). Most cells of large triangles are in such runs. Moves `at` to the first square after
+  // the run, and returns its q. highest_ and lowest_ remain those of the run's last square.
+  template <class Visit>
+  VOXDAG_HD int64_t visit_run(int64_t p, int64_t q, Int (&at)[3], Visit&& visit) {
+    const Int b[3] = {t_.edges[2][0].b, t_.edges[2][1].b, t_.edges[2][2].b};
+    const Int n = t_.normal[2], step = magnitude(t_.normal[1]);
+    Int inside[3] = {at[0] - margin_[0], at[1] - margin_[1], at[2] - margin_[2]};
+    // >= 0 as long as the plane rises into no higher cell, or falls into no lower one.
+    Int room = t_.normal[1] < 0 ? lowest_ + n - 1 : n - 1 - highest_;
+    const int64_t begin = q, r = first_;
+    const bool is_in_range = r >= range_.first[2] && r <= range_.last[2];
+    do {
+      if (is_in_range) visit(p, q, r, kAllColumns);
+      ++q;
+      for (int i = 0; i < 3; ++i) inside[i] += b[i];
+      room -= step;
+    } while (q <= range_.last[1] && (inside[0] | inside[1] | inside[2] | room) >= 0);
+    for (int i = 0; i < 3; ++i) at[i] = inside[i] + margin_[i];
+    highest_ += t_.normal[1] * (q - begin - 1);
+    lowest_ += t_.normal[1] * (q - begin - 1);
+    return q;
   }
 
   // Sets first_ and last_ to the range of cells that the plane touches in the column of cells (p,
@@ -119,8 +161,7 @@ class TouchedCells {
     const int64_t first = first_ > range_.first[2] ? first_ : range_.first[2];
     const int64_t last = last_ < range_.last[2] ? last_ : range_.last[2];
     if (first > last) return;
-    const bool inside =
-        !t_.degenerate && ((at[0] - margin_[0]) | (at[1] - margin_[1]) | (at[2] - margin_[2])) >= 0;
+    const bool inside = is_inside(at);
     const uint32_t columns = t_.degenerate ? 0 : inside ? kAllColumns : columns_in_shadow(p, q);
     // If the plane touches several cells of this column of cells, the covered columns are divided
     // among them.
@@ -176,7 +217,10 @@ class TouchedCells {
 
   const CellTriangle<Int>& t_;
   const CellRange& range_;
-  Int margin_[3];    // an edge function's maximum minus its minimum over a cell
+  Int margin_[3];  // an edge function's maximum minus its minimum over a cell
+  // True if the plane's slope along axis 1 is at most 1/4. Only then are runs long enough to save
+  // more time than their branches cost, which the CPU often mispredicts.
+  bool is_level_;
   Int rise_, fall_;  // the plane's rise and fall over a cell, along axes 0 and 1
   // first_ and last_ are the first and the last cell that the plane touches in the current column
   // of cells. highest_ is the highest value of the plane's function in the first cell, and lowest_

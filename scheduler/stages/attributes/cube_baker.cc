@@ -24,8 +24,8 @@ constexpr size_t kPartBytes = 16 << 10;
 
 // Memory of a baked cell: its weight, its sum, a sorted copy of the sum, and its colors.
 constexpr uint64_t kCellBytes = sizeof(uint64_t) + sizeof(ColorSum) + sizeof(ColoredCell) + 8;
-// Other memory of a baker: positions of cells, the next coarser level, and two parts of the
-// records.
+// Other memory of a baker: positions of cells, the next coarser level, two parts of the records,
+// and FlatRegion.
 constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
 
 uint32_t max_cells_of(uint64_t region_bytes) {
@@ -35,6 +35,10 @@ uint32_t max_cells_of(uint64_t region_bytes) {
                 kFixedBytes + (color::RegionCells::kMaxCells + kTriangleCells) * kCellBytes);
   return static_cast<uint32_t>(std::min<uint64_t>(
       (region_bytes - kFixedBytes) / kCellBytes - kTriangleCells, color::RegionCells::kMaxCells));
+}
+
+uint64_t morton_of(const Cube& cube) {
+  return morton_encode(cube.position[0], cube.position[1], cube.position[2]);
 }
 
 AttributeSet set_of(std::span<const StoredAttribute> attributes) {
@@ -51,14 +55,17 @@ CubeBaker::CubeBaker(const ColorGrid& grid, std::span<const StoredAttribute> att
                      MemoryBudget& budget, const CancelToken& cancel, const Cutouts* cutouts)
     : grid_(grid),
       attributes_(attributes),
+      materials_(materials),
       store_(store),
       surface_bytes_(surface_bytes),
       max_cells_(max_cells_of(region_bytes)),
       budget_(budget),
       cancel_(cancel),
+      cutouts_(cutouts),
       charge_(budget, region_bytes + ColorMemory::value_bytes(set_of(attributes)), "baking colors"),
       sum_charge_(budget, 0, "normals and materials of a region"),
-      baker_(grid, materials, textures, set_of(attributes), cutouts) {}
+      baker_(grid, materials, textures, set_of(attributes), cutouts),
+      flat_region_(grid) {}
 
 void CubeBaker::bake(const Cube& cube, ChunkList& bin, Records& records, const TakeRecords& take) {
   bake(cube, bin, {records, take});
@@ -112,8 +119,10 @@ void CubeBaker::descend(const Cube& cube, std::span<const uint32_t> touching, co
   if (cube.level == grid_.region_level()) {
     touching_.clear();
     for (const uint32_t i : touching) touching_.push_back(surfaces_[i]);
-    return bake_region(
-        cube, [&](const auto& add) { add(touching_); }, sink);
+    if (!bake_flat_region(cube, sink))
+      bake_region(
+          cube, [&](const auto& add) { add(touching_); }, sink);
+    return;
   }
   std::vector<uint8_t> masks;
   masks.reserve(touching.size());
@@ -151,6 +160,21 @@ void CubeBaker::bake_in_parts(const Cube& region, ChunkList& bin, const Sink& si
   touching_ = {};
 }
 
+// Bakes a region whose surfaces, touching_, all have the same flat color. Returns false without
+// effect for all other regions, if attributes other than colors are wanted, and if FlatRegion
+// refuses the region.
+bool CubeBaker::bake_flat_region(const Cube& region, const Sink& sink) {
+  if (attributes_.size() != 1 || attributes_[0].kind != Attribute::kColor) return false;
+  const auto color = only_color_of(touching_, materials_, cutouts_);
+  if (!color || !flat_region_.find(region, touching_)) return false;
+  cancel_.check();
+  append_region(encode_flat_region(grid_.color_levels - grid_.region_level(), morton_of(region),
+                                   flat_region_.cells(), *color, flat_region_.weight()),
+                sink.records[0]);
+  if (sink.records[0].size() >= kManyRecordBytes) sink.take(sink.records);
+  return true;
+}
+
 // Bakes a region, and appends its record for each attribute to sink.records. add_surfaces(add) must
 // call add() with all surfaces of the region, in one part or several. If the region has too many
 // cells for the memory, its eight children are baked separately.
@@ -177,7 +201,7 @@ void CubeBaker::bake_region(const Cube& region, const AddSurfaces& add_surfaces,
       collect(child * cells_of_child, encoders);
     }
   }
-  const uint64_t morton = morton_encode(region.position[0], region.position[1], region.position[2]);
+  const uint64_t morton = morton_of(region);
   size_t most = 0;
   for (size_t i = 0; i < attributes_.size(); ++i) {
     if (encoders[i].empty()) return;

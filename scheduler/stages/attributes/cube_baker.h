@@ -11,6 +11,7 @@
 #include "core/base/memory_budget.h"
 #include "core/color/blocks/attribute_encoder.h"
 #include "core/color/rule/bake_region.h"
+#include "core/color/rule/flat_region.h"
 #include "scene/textures/texture_set.h"
 #include "scheduler/stages/attributes/color_keys.h"
 #include "scheduler/triangles/surface_record.h"
@@ -52,6 +53,7 @@ class CubeBaker {
   void divide(const Cube& cube, ChunkList& bin, const Sink& sink);
   void descend(const Cube& cube, std::span<const uint32_t> touching, const Sink& sink);
   void bake_in_parts(const Cube& region, ChunkList& bin, const Sink& sink);
+  bool bake_flat_region(const Cube& region, const Sink& sink);
   template <class AddSurfaces>
   void bake_region(const Cube& region, const AddSurfaces& add_surfaces, const Sink& sink);
   template <class AddSurfaces>
@@ -61,14 +63,17 @@ class CubeBaker {
 
   const ColorGrid grid_;
   const std::span<const StoredAttribute> attributes_;
+  const std::span<const Material> materials_;
   RecordStore& store_;
   const uint64_t surface_bytes_;
   const uint32_t max_cells_;  // maximum number of cells of a region that are baked in one piece
   MemoryBudget& budget_;
   const CancelToken& cancel_;
+  const Cutouts* const cutouts_;
   const MemoryCharge charge_;
   MemoryCharge sum_charge_;  // charge for sums that exceed ColorMemory::kValueSumBytes
   RegionBaker<TextureReader> baker_;
+  FlatRegion flat_region_;
   std::vector<FixedSurface> surfaces_;  // surfaces of the cube
   std::vector<FixedSurface> touching_;  // surfaces of a region, or a part of them
   std::vector<ColoredCell> cells_;

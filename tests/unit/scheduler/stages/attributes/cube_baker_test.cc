@@ -16,6 +16,9 @@ namespace {
 
 const std::string kRecordsFile = "records";  // the file that errors of RegionRecords name
 
+constexpr StoredAttribute kAllAttributes[] = {
+    {}, {Attribute::kAlpha, 1}, {Attribute::kNormal, 2}, {Attribute::kMaterial, 1}};
+
 struct Baked {
   CubeBaker::Records records;
   size_t parts = 0;  // number of times that the baker handed over records before the end
@@ -34,7 +37,8 @@ class CubeBaking : public testing::Test {
       c.color = {static_cast<uint16_t>(random(65536)), 9, 40000, kFullIntensity};
   }
   // Bakes the complete grid.
-  Baked bake(uint64_t region_bytes, uint64_t surface_bytes) {
+  Baked bake(uint64_t region_bytes, uint64_t surface_bytes,
+             std::span<const StoredAttribute> attributes = kAllAttributes) {
     MemoryBudget budget(uint64_t{1} << 30);
     NoProgress progress;
     const CancelToken cancel;
@@ -50,13 +54,11 @@ class CubeBaking : public testing::Test {
       append_surface(surface, false, record);
       store.add(bin, record, 1);
     }
-    const StoredAttribute attributes[] = {
-        {}, {Attribute::kAlpha, 1}, {Attribute::kNormal, 2}, {Attribute::kMaterial, 1}};
     CubeBaker baker(grid_, attributes, textures->materials(), *reader, store, region_bytes,
                     surface_bytes, budget, cancel);
     Baked baked;
-    baked.records.resize(std::size(attributes));
-    CubeBaker::Records last(std::size(attributes));
+    baked.records.resize(attributes.size());
+    CubeBaker::Records last(attributes.size());
     const auto append = [&] {
       size_t most = 0;
       for (size_t i = 0; i < last.size(); ++i) {
@@ -108,6 +110,30 @@ TEST_F(CubeBaking, DividesSurfaces) {
   // With 1 KiB, even the surfaces of one region do not fit, so each region processes them in
   // several parts.
   EXPECT_EQ(bake(ColorMemory::kRegionBytes, 1 << 10).records, whole.records);
+}
+
+// If only colors are wanted, regions of one flat color are baked by other code. Their records are
+// the same. Most regions of this scene have one color, and some have two.
+TEST_F(CubeBaking, BakesFlatRegionsLikeOthers) {
+  for (int i = 0; i < 400; ++i) {
+    FixedSurface surface;
+    int64_t corner[3];
+    for (int64_t& c : corner) c = random((int64_t{1} << (grid_.levels + kUnitBits)) - 20000);
+    for (auto& vertex : surface.position.v)
+      for (int a = 0; a < 3; ++a) vertex[a] = (corner[a] + random(20000)) | 1;
+    for (SurfaceCorner& c : surface.corners)
+      c.color = {9, static_cast<uint16_t>(corner[0] < 40000 ? 300 : 20000), 7, kFullIntensity};
+    surfaces_.push_back(surface);
+  }
+  const Baked all = bake(ColorMemory::kRegionBytes, uint64_t{64} << 20);
+  // With 1 KiB, most regions process their surfaces in several parts.
+  for (const uint64_t surface_bytes : {uint64_t{64} << 20, uint64_t{1} << 10}) {
+    const Baked colors =
+        bake(ColorMemory::kRegionBytes, surface_bytes, std::span(kAllAttributes).first(1));
+    ASSERT_EQ(colors.records.size(), 1u);
+    EXPECT_EQ(colors.records[0], all.records[0]);
+  }
+  EXPECT_GT(all.records[0].size(), 100000u);
 }
 
 class SolidCubes : public CubeBaking {
