@@ -54,12 +54,14 @@ uint64_t pack_bytes_of(const std::string& text) {
   return bytes;
 }
 
-std::string manifest_of(const PublishCommand& command, const voxdag_reader::File& file,
-                        const CancelToken& cancel) {
+// Sets the manifest and the camera.
+void describe(const PublishCommand& command, const voxdag_reader::File& file,
+              const CancelToken& cancel, query::PackageSpec& spec) {
   auto manifest = server::file_manifest(file, query::DagView(file), "", cancel);
   manifest["tile_levels"] = query::kPackageTileLevels;
   manifest["name"] = title_of(command);
-  return exact_json_text(manifest);
+  spec.manifest = exact_json_text(manifest);
+  if (manifest.contains("camera")) spec.camera = server::placement_of(manifest["camera"], file);
 }
 
 void print(const PublishCommand& command, const query::PackageReport& r, const RunTimes& times) {
@@ -136,7 +138,7 @@ void run(const PublishCommand& command, CommandContext& context) {
   spec.memory_bytes = memory_limit(command.memory);
   spec.threads = command.threads;
   const auto file = open_global_file(command.input);
-  spec.manifest = manifest_of(command, *file, context.cancel);
+  describe(command, *file, context.cancel, spec);
   const auto progress = make_progress_bar(command.quiet);
   const RunTimer timer;
   const query::PackageReport report = write(command, *file, spec, *progress, context);

@@ -32,11 +32,26 @@ void PackWriter::begin_band(bool is_color, uint32_t level) {
   index_.bands.push_back({.is_color = is_color, .level = level});
 }
 
-void PackWriter::add_block(std::string_view bytes, uint64_t items, uint64_t code) {
+void PackWriter::expect_small(std::string_view bytes) const {
   if (bytes.size() > std::numeric_limits<uint16_t>::max())
     throw Error(ErrorCode::kLimit, folder_ + ": a block of the package has " +
                                        std::to_string(bytes.size()) +
                                        " bytes: expected at most 65535");
+}
+
+void PackWriter::add_head_block(std::string_view bytes, uint64_t items, uint64_t head_tiles) {
+  expect_small(bytes);
+  PackageBand& band = index_.bands.back();
+  ++band.blocks;
+  band.items += items;
+  band.head_tiles += head_tiles;
+  index_.head.lengths.push_back(static_cast<uint16_t>(bytes.size()));
+  head_ += bytes;
+  bytes_ += bytes.size();
+}
+
+void PackWriter::add_block(std::string_view bytes, uint64_t items, uint64_t code) {
+  expect_small(bytes);
   const uint64_t limit =
       index_.packs.empty() ? std::min(kFirstPackBytes, pack_bytes_) : pack_bytes_;
   if (out_ && pack_.bytes + bytes.size() > limit) end_pack();
@@ -94,6 +109,11 @@ PackageIndex PackWriter::finish() {
   if (out_) end_pack();
   index_.directory = {hashed_name("directory", directory_, ".bin"), directory_.size(), 0};
   write_file(index_.directory.name, directory_);
+  if (!head_.empty()) {
+    index_.head.name = hashed_name("head", head_, ".bin");
+    index_.head.bytes = head_.size();
+    write_file(index_.head.name, head_);
+  }
   files_.sync_directory(folder_ + "/packs");
   return std::move(index_);
 }

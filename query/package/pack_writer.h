@@ -1,4 +1,4 @@
-// Writes the packs and the directory of a package (package_index.h). Not thread-safe.
+// Writes the packs, the directory and the head of a package (package_index.h). Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -24,13 +24,17 @@ class PackWriter {
   // Adds a compressed block to the current band. `items` is the number of tiles or color pages in
   // the block. `code` is the Morton code of its first color page; it is 0 for tiles.
   void add_block(std::string_view bytes, uint64_t items, uint64_t code);
-  // Completes the packs and writes the directory. Returns the index of the package, in which the
-  // manifest and the files of the viewer are missing.
+  // Adds a compressed block of tiles of the current band to the head. `head_tiles` is the number of
+  // its tiles that the first picture needs. The band's other blocks must be added later.
+  void add_head_block(std::string_view bytes, uint64_t items, uint64_t head_tiles);
+  // Completes the packs, and writes the directory and the head. Returns the index of the package,
+  // in which the manifest and the files of the viewer are missing.
   PackageIndex finish();
-  // Returns the number of bytes in all packs so far.
+  // Returns the number of bytes in the head and in all packs so far.
   uint64_t bytes() const { return bytes_; }
 
  private:
+  void expect_small(std::string_view bytes) const;
   void end_pack();
   void end_page();
   void write_file(const std::string& name, std::string_view contents);
@@ -47,6 +51,7 @@ class PackWriter {
   std::vector<uint16_t> lengths_;  // compressed sizes of the page's blocks
   std::vector<uint64_t> codes_;    // codes of the page's color blocks
   std::string directory_;
+  std::string head_;  // the blocks of the head
 };
 
 }  // namespace voxdag::query

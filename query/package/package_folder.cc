@@ -37,6 +37,7 @@ PackageIndex index_of_folder(FileSystem& files, const std::string& folder) {
 // and index.html.
 std::set<std::string> hashed_files(const PackageIndex& index) {
   std::set<std::string> names = {index.directory.name};
+  if (!index.head.name.empty()) names.insert(index.head.name);
   for (const PackageFile& pack : index.packs) names.insert(pack.name);
   for (const PackageFile& file : index.viewer) names.insert(file.name);
   return names;

@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "voxdag package";
-constexpr int kVersion = 1;
+constexpr uint64_t kVersion = 2;  // version 1 has no head
 // Maximum depth of nested values in package.json. Formatting nested JSON recurses, so a greater
 // depth could overflow the stack.
 constexpr int kMaxDepth = 32;
@@ -53,16 +53,18 @@ class Parser {
     expect(!is_too_deep, "the text", "a depth of at most " + std::to_string(kMaxDepth));
     expect(json.is_object() && json.value("format", Json()) == kFormat, "'format'",
            std::string("'") + kFormat + "'");
-    if (json.value("version", Json()) != kVersion)
+    const Json version = json.value("version", Json());
+    if (version != 1 && version != kVersion)
       throw Error(ErrorCode::kUnsupportedVersion,
-                  path_ + ": it has version " + exact_json_text(json.value("version", Json())) +
-                      " of the format, expected version " + std::to_string(kVersion));
+                  path_ + ": it has version " + exact_json_text(version) +
+                      " of the format, expected version 1 or " + std::to_string(kVersion));
     PackageIndex index;
     const Json& manifest = member(json, "manifest");
     expect(manifest.is_object(), "'manifest'", "an object");
     index.manifest = exact_json_text(manifest);
     for (const Json& band : list(json, "bands")) index.bands.push_back(band_of(band));
     expect(index.bands.size() <= kMaxBands, "'bands'", "at most two bands of each level");
+    if (json.contains("head")) index.head = head_of(json["head"]);
     const Json& directory = member(json, "directory");
     index.directory = file_of(directory);
     for (const Json& page : list(directory, "pages"))
@@ -113,10 +115,25 @@ class Parser {
     band.level = static_cast<uint32_t>(level);
     band.items = number(json, band.is_color ? "pages" : "tiles");
     band.blocks = number(json, "blocks");
+    if (json.contains("head_tiles")) {
+      band.head_tiles = number(json, "head_tiles");
+      expect(!band.is_color && band.head_tiles <= band.items, "'head_tiles'",
+             "at most the number of tiles of the band");
+    }
     expect(band.is_color ? band.blocks <= band.items
                          : band.blocks == (band.items + kBlockTiles - 1) / kBlockTiles,
            "'blocks'", "the number of blocks of a band");
     return band;
+  }
+  PackageHead head_of(const Json& json) const {
+    const PackageFile file = file_of(json);
+    PackageHead head{file.name, file.bytes, {}};
+    for (const Json& length : list(json, "blocks")) {
+      expect(length.is_number_unsigned() && length.get<uint64_t>() <= UINT16_MAX, "'blocks'",
+             "a list of block sizes of at most 65535 bytes");
+      head.lengths.push_back(length.get<uint16_t>());
+    }
+    return head;
   }
   // Adds `blocks` to `sum`, which must remain at most kMaxNumber. Without this limit, the sum of
   // many packs could wrap around.
@@ -125,8 +142,17 @@ class Parser {
     sum += blocks;
   }
   void check_sums(const PackageIndex& index) const {
-    uint64_t of_bands = 0, of_packs = 0, of_pages = 0;
-    for (const PackageBand& band : index.bands) add_blocks(band.blocks, of_bands);
+    uint64_t of_bands = 0, of_packs = 0, of_pages = 0, of_head = 0, head_bytes = 0;
+    for (const PackageBand& band : index.bands) {
+      add_blocks(band.pack_blocks(), of_bands);
+      add_blocks(band.head_blocks(), of_head);
+    }
+    for (const uint16_t length : index.head.lengths) head_bytes += length;
+    expect(index.head.lengths.size() <= kMaxHeadBlocks, "'head'",
+           "at most " + std::to_string(kMaxHeadBlocks) + " blocks");
+    expect(of_head == index.head.lengths.size(), "'head'",
+           "the sizes of the blocks that the bands have in the head");
+    expect(head_bytes == index.head.bytes, "'head'", "the sum of the sizes of its blocks");
     for (const PackageFile& pack : index.packs) {
       expect(pack.blocks > 0, "'blocks'", "at least one block in each pack");
       add_blocks(pack.blocks, of_packs);
@@ -150,10 +176,12 @@ class Parser {
 
 std::string index_text(const PackageIndex& index) {
   Json bands = Json::array(), pages = Json::array(), packs = Json::array(), viewer = Json::array();
-  for (const PackageBand& band : index.bands)
+  for (const PackageBand& band : index.bands) {
     bands.push_back({{"level", band.level},
                      {band.is_color ? "pages" : "tiles", band.items},
                      {"blocks", band.blocks}});
+    if (band.head_tiles > 0) bands.back()["head_tiles"] = band.head_tiles;
+  }
   for (const DirectoryPage& page : index.pages)
     pages.push_back(
         {{"bytes", page.bytes}, {"pack", page.pack}, {"offset", page.offset}, {"code", page.code}});
@@ -161,13 +189,16 @@ std::string index_text(const PackageIndex& index) {
   for (const PackageFile& file : index.viewer) viewer.push_back(file_json(file, false));
   Json directory = file_json(index.directory, false);
   directory["pages"] = std::move(pages);
-  const Json json = {{"format", kFormat},
-                     {"version", kVersion},
-                     {"manifest", parse_json<Json>(index.manifest)},
-                     {"bands", std::move(bands)},
-                     {"directory", std::move(directory)},
-                     {"packs", std::move(packs)},
-                     {"viewer", std::move(viewer)}};
+  Json json = {{"format", kFormat},
+               {"version", kVersion},
+               {"manifest", parse_json<Json>(index.manifest)},
+               {"bands", std::move(bands)}};
+  if (!index.head.name.empty())
+    json["head"] = {
+        {"name", index.head.name}, {"bytes", index.head.bytes}, {"blocks", index.head.lengths}};
+  json["directory"] = std::move(directory);
+  json["packs"] = std::move(packs);
+  json["viewer"] = std::move(viewer);
   return exact_json_text(json) + "\n";
 }
 

@@ -39,6 +39,30 @@ T number_at(std::string_view bytes, size_t at) {
   return number;
 }
 
+// Collects the references to the tiles of a band that are in the head.
+class HeadReferences {
+ public:
+  explicit HeadReferences(uint64_t count) : is_referenced_(count, false) {}
+
+  void add(const TileBlock& block) {
+    for (const std::vector<uint32_t>& tile : block.tiles) {
+      if (has_bricks(tile)) return;
+      for (size_t at = leaves_begin(tile); at < tile.size(); at += 4)
+        if (tile[at] < is_referenced_.size()) is_referenced_[tile[at]] = true;
+    }
+  }
+  void expect_all(const std::string& path, uint32_t level) const {
+    const auto missing = std::ranges::find(is_referenced_, false);
+    if (missing != is_referenced_.end())
+      corrupt(path, "level " + std::to_string(level) + " has no tile in the head that refers to " +
+                        "tile " + std::to_string(missing - is_referenced_.begin()) +
+                        " of the band below, which is in the head: expected a reference");
+  }
+
+ private:
+  std::vector<bool> is_referenced_;  // by number of the tile
+};
+
 }  // namespace
 
 PackageReader::PackageReader(FileSystem& files, const std::string& folder)
@@ -66,6 +90,11 @@ PackageReader::PackageReader(FileSystem& files, const std::string& folder)
   for (const DirectoryPage& page : index_.pages) {
     page_begins_.push_back(at);
     at += page.bytes;
+  }
+  at = 0;
+  for (const uint16_t length : index_.head.lengths) {
+    head_begins_.push_back(at);
+    at += length;
   }
   check_directory();
 }
@@ -96,7 +125,7 @@ void PackageReader::check_directory() {
 uint64_t PackageReader::count_color_blocks(uint64_t first, uint64_t count) const {
   uint64_t colored = 0, begin = 0;
   for (const PackageBand& band : index_.bands) {
-    const uint64_t end = begin + band.blocks, low = std::max(begin, first),
+    const uint64_t end = begin + band.pack_blocks(), low = std::max(begin, first),
                    high = std::min(end, first + count);
     if (band.is_color && low < high) colored += high - low;
     begin = end;
@@ -131,7 +160,7 @@ std::vector<PackageReader::Place> PackageReader::decode_page(uint64_t page,
       static_cast<uint64_t>(std::ranges::upper_bound(pack_ends_, first) - pack_ends_.begin());
   uint64_t offset = index_.pages[page].offset;
   size_t band = 0;
-  uint64_t band_end = index_.bands[0].blocks;
+  uint64_t band_end = index_.bands[0].pack_blocks();
   std::vector<Place> places;
   places.reserve(count);
   for (uint64_t i = 0; i < count; ++i) {
@@ -140,7 +169,7 @@ std::vector<PackageReader::Place> PackageReader::decode_page(uint64_t page,
       ++pack;
       offset = 0;
     }
-    while (block == band_end) band_end += index_.bands[++band].blocks;
+    while (block >= band_end) band_end += index_.bands[++band].pack_blocks();
     Place place{pack, offset, number_at<uint16_t>(plain, kDirectoryEntryBytes * i), 0};
     if (index_.bands[band].is_color) {
       place.code = number_at<uint32_t>(plain, low) | uint64_t{number_at<uint32_t>(plain, high)}
@@ -172,28 +201,48 @@ const PackageReader::Place& PackageReader::place_of(uint64_t block) const {
   return cached_places_[block % kPageBlocks];
 }
 
-PackageReader::PlacedBand PackageReader::find_band(bool is_color, uint32_t level) const {
-  uint64_t first = 0;
+PackageReader::Place PackageReader::place_of(const PlacedBand& band, uint64_t i) const {
+  const uint64_t in_head = band.band.head_blocks();
+  if (i >= in_head) return place_of(band.first + i - in_head);
+  const uint64_t at = band.first_in_head + i;
+  return {kHead, head_begins_[at], index_.head.lengths[at], 0};
+}
+
+std::vector<PackageReader::PlacedBand> PackageReader::placed_bands() const {
+  std::vector<PlacedBand> bands;
+  uint64_t first = 0, first_in_head = 0;
   for (const PackageBand& band : index_.bands) {
-    if (band.is_color == is_color && band.level == level) return {band, first};
-    first += band.blocks;
+    bands.push_back({band, first, first_in_head});
+    first += band.pack_blocks();
+    first_in_head += band.head_blocks();
   }
+  return bands;
+}
+
+PackageReader::PlacedBand PackageReader::find_band(bool is_color, uint32_t level) const {
+  for (const PlacedBand& placed : placed_bands())
+    if (placed.band.is_color == is_color && placed.band.level == level) return placed;
   throw Error(ErrorCode::kNotFound,
               folder_ + ": level " + std::to_string(level) +
                   (is_color ? " has no color pages: expected a level with colors"
                             : " has no tiles: expected a level with tiles"));
 }
 
-std::string PackageReader::name_of(uint64_t block) const {
-  return path_of(index_.packs[place_of(block).pack].name) + ": block " + std::to_string(block);
+std::string PackageReader::path_of(const Place& place) const {
+  return path_of(place.pack == kHead ? index_.head.name : index_.packs[place.pack].name);
 }
 
-std::string PackageReader::block(uint64_t block) const {
-  const Place& place = place_of(block);
-  const auto file = files_.open_read(path_of(index_.packs[place.pack].name));
+std::string PackageReader::name_of(const PlacedBand& band, uint64_t i) const {
+  return path_of(place_of(band, i)) + ": block " + std::to_string(i) + " of level " +
+         std::to_string(band.band.level);
+}
+
+std::string PackageReader::block(const PlacedBand& band, uint64_t i) const {
+  const Place place = place_of(band, i);
+  const auto file = files_.open_read(path_of(place));
   std::string bytes(place.bytes, '\0');
   file->read_at(place.offset, std::as_writable_bytes(std::span(bytes.data(), bytes.size())));
-  return naming_file(name_of(block), [&] { return gunzip_block(bytes, kMaxBlockBytes); });
+  return naming_file(name_of(band, i), [&] { return gunzip_block(bytes, kMaxBlockBytes); });
 }
 
 std::vector<uint32_t> PackageReader::tile(uint32_t level, uint64_t number) const {
@@ -203,11 +252,10 @@ std::vector<uint32_t> PackageReader::tile(uint32_t level, uint64_t number) const
                                           std::to_string(level) +
                                           " does not exist: expected a number below " +
                                           std::to_string(band.band.items));
-  const uint64_t at = band.first + number / kBlockTiles,
-                 count = std::min<uint64_t>(kBlockTiles,
-                                            band.band.items - number / kBlockTiles * kBlockTiles);
-  const std::string bytes = block(at);
-  return naming_file(name_of(at), [&] {
+  const uint64_t i = number / kBlockTiles,
+                 count = std::min<uint64_t>(kBlockTiles, band.band.items - i * kBlockTiles);
+  const std::string bytes = block(band, i);
+  return naming_file(name_of(band, i), [&] {
     return decode_tile_block(bytes, grid_levels_, level, static_cast<uint32_t>(count))
         .tiles[number % kBlockTiles];
   });
@@ -227,8 +275,9 @@ std::vector<uint32_t> PackageReader::color_page(uint32_t level,
        page * kPageBlocks < end && index_.pages[page].code <= code; ++page)
     at = page * kPageBlocks;
   while (at + 1 < end && place_of(at + 1).code <= code) ++at;
-  const std::string bytes = block(at);
-  for (CodedPage& page : naming_file(name_of(at), [&] { return decode_color_block(bytes); }))
+  const uint64_t i = at - band.first;
+  const std::string bytes = block(band, i);
+  for (CodedPage& page : naming_file(name_of(band, i), [&] { return decode_color_block(bytes); }))
     if (page.code == code) return std::move(page.words);
   return {0};
 }
@@ -252,13 +301,17 @@ void PackageReader::check_file(const PackageFile& file, const CancelToken& cance
     corrupt(path, "its contents have the hash " + hash + ": expected the hash in its name");
 }
 
-uint64_t PackageReader::check_tiles(const PlacedBand& band, Progress& progress,
-                                    const CancelToken& cancel) const {
-  uint32_t next = 0;
+// Checks the tiles of a band. The first `head_tiles_below` tiles of the band below are in the head,
+// so tiles of this band in the head must refer to all of them. Returns the number of tiles to which
+// this band refers.
+uint64_t PackageReader::check_tiles(const PlacedBand& band, uint64_t head_tiles_below,
+                                    Progress& progress, const CancelToken& cancel) const {
+  auto next = static_cast<uint32_t>(head_tiles_below);
+  HeadReferences references(head_tiles_below);
   for (uint64_t i = 0; i < band.band.blocks; ++i) {
     cancel.check();
-    const std::string bytes = block(band.first + i);
-    naming_file(name_of(band.first + i), [&] {
+    const std::string bytes = block(band, i);
+    naming_file(name_of(band, i), [&] {
       const uint64_t count = std::min<uint64_t>(kBlockTiles, band.band.items - i * kBlockTiles);
       const TileBlock tiles =
           decode_tile_block(bytes, grid_levels_, band.band.level, static_cast<uint32_t>(count));
@@ -268,25 +321,27 @@ uint64_t PackageReader::check_tiles(const PlacedBand& band, Progress& progress,
                                              std::to_string(next) +
                                              ", which follows the tiles of the blocks before it");
       next = tiles.next;
+      if (i < band.band.head_blocks()) references.add(tiles);
     });
     progress.advance(1);
   }
+  references.expect_all(path_of(kIndexName), band.band.level);
   return next;
 }
 
 void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
                                  const CancelToken& cancel) const {
   uint64_t count = 0, last = 0;
-  for (uint64_t at = band.first; at < band.first + band.band.blocks; ++at) {
+  for (uint64_t i = 0; i < band.band.blocks; ++i) {
     cancel.check();
-    const std::string bytes = block(at);
-    naming_file(name_of(at), [&] {
+    const std::string bytes = block(band, i);
+    naming_file(name_of(band, i), [&] {
       const std::vector<CodedPage> pages = decode_color_block(bytes);
-      const uint64_t code = pages[0].code;
-      if (code != place_of(at).code)
-        throw Error(ErrorCode::kCorrupt,
-                    "its first color page has the Morton code " + std::to_string(code) +
-                        ", expected " + std::to_string(place_of(at).code) + " as in the directory");
+      const uint64_t code = pages[0].code, expected = place_of(band, i).code;
+      if (code != expected)
+        throw Error(ErrorCode::kCorrupt, "its first color page has the Morton code " +
+                                             std::to_string(code) + ", expected " +
+                                             std::to_string(expected) + " as in the directory");
       if (count > 0 && code <= last)
         throw Error(ErrorCode::kCorrupt, "its first color page has the Morton code " +
                                              std::to_string(code) + ", expected more than " +
@@ -304,23 +359,28 @@ void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
 }
 
 void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
-  progress.begin_stage("check", blocks_, "blocks");
+  progress.begin_stage("check", blocks_ + index_.head.lengths.size(), "blocks");
   check_file(index_.directory, cancel);
+  if (!index_.head.name.empty()) check_file({index_.head.name, index_.head.bytes, 0}, cancel);
   for (const PackageFile& file : index_.viewer) check_file(file, cancel);
   for (const PackageFile& pack : index_.packs) check_file(pack, cancel);
-  uint64_t first = 0, expected = 1;
-  for (const PackageBand& band : index_.bands) {
+  const std::vector<PlacedBand> bands = placed_bands();
+  uint64_t expected = 1;
+  for (auto placed = bands.begin(); placed != bands.end(); ++placed) {
+    const PackageBand& band = placed->band;
     if (band.is_color) {
-      check_colors({band, first}, progress, cancel);
-    } else {
-      if (band.items != expected)
-        corrupt(path_of(kIndexName), "level " + std::to_string(band.level) + " has " +
-                                         std::to_string(band.items) + " tiles: expected " +
-                                         std::to_string(expected) +
-                                         ", the number of references to them");
-      expected = check_tiles({band, first}, progress, cancel);
+      check_colors(*placed, progress, cancel);
+      continue;
     }
-    first += band.blocks;
+    if (band.items != expected)
+      corrupt(path_of(kIndexName), "level " + std::to_string(band.level) + " has " +
+                                       std::to_string(band.items) + " tiles: expected " +
+                                       std::to_string(expected) +
+                                       ", the number of references to them");
+    const auto below = std::find_if(placed + 1, bands.end(),
+                                    [](const PlacedBand& each) { return !each.band.is_color; });
+    expected =
+        check_tiles(*placed, below == bands.end() ? 0 : below->band.head_tiles, progress, cancel);
   }
   progress.end_stage();
 }

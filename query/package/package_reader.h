@@ -41,17 +41,21 @@ class PackageReader {
   void check(Progress& progress, const CancelToken& cancel) const;
 
  private:
-  // Where a block is stored. `code` is the Morton code of its first color page; it is 0 for tiles.
+  // Where a block is stored. `pack` is kHead for a block of the head. `code` is the Morton code of
+  // the block's first color page; it is 0 for tiles.
+  static constexpr uint64_t kHead = ~uint64_t{0};
   struct Place {
     uint64_t pack = 0;
     uint64_t offset = 0;
     uint64_t bytes = 0;
     uint64_t code = 0;
   };
-  // A band, and the number of its first block.
+  // A band, the number of its first block in the packs, and the number of its first block in the
+  // head.
   struct PlacedBand {
     PackageBand band;
     uint64_t first = 0;
+    uint64_t first_in_head = 0;
   };
 
   void check_directory();
@@ -59,20 +63,26 @@ class PackageReader {
   std::vector<Place> read_page(uint64_t page) const;
   std::vector<Place> decode_page(uint64_t page, const std::string& compressed) const;
   const Place& place_of(uint64_t block) const;
+  // Returns the place of a block of a band. `i` is the number of the block in the band.
+  Place place_of(const PlacedBand& band, uint64_t i) const;
   uint64_t count_color_blocks(uint64_t first, uint64_t count) const;
+  std::vector<PlacedBand> placed_bands() const;
   PlacedBand find_band(bool is_color, uint32_t level) const;
-  std::string block(uint64_t block) const;
+  std::string block(const PlacedBand& band, uint64_t i) const;
   std::string path_of(const std::string& name) const { return folder_ + "/" + name; }
-  std::string name_of(uint64_t block) const;
+  std::string path_of(const Place& place) const;
+  std::string name_of(const PlacedBand& band, uint64_t i) const;
   void check_file(const PackageFile& file, const CancelToken& cancel) const;
-  uint64_t check_tiles(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;
+  uint64_t check_tiles(const PlacedBand& band, uint64_t head_tiles_below, Progress& progress,
+                       const CancelToken& cancel) const;
   void check_colors(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;
 
   FileSystem& files_;
   const std::string folder_;
   PackageIndex index_;
   uint32_t grid_levels_ = 0;
-  uint64_t blocks_ = 0;
+  uint64_t blocks_ = 0;                // number of blocks in the packs
+  std::vector<uint64_t> head_begins_;  // offset of each block of the head
   std::vector<uint64_t> page_begins_;  // offset of each page in the directory
   std::vector<uint64_t> pack_ends_;    // number of the block after the last block of each pack
   // The page of the directory that was read last.

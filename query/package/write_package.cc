@@ -13,6 +13,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "query/package/color_bands.h"
+#include "query/package/first_tiles.h"
 #include "query/package/gzip_block.h"
 #include "query/package/pack_writer.h"
 #include "query/package/package_folder.h"
@@ -45,6 +46,8 @@ class BandWriter {
 
   void run() {
     if (dag_.empty()) return;
+    first_.resize(dag_.grid_levels());
+    if (spec_.camera) first_ = find_first_tiles(dag_, *spec_.camera, cancel_);
     const uint32_t bricks = dag_.grid_levels() - kBrickLevels;
     progress_.begin_stage("tiles", tile_count(), "tiles");
     SpillList<uint64_t> root(space_);
@@ -52,6 +55,7 @@ class BandWriter {
     root.finish();
     std::unique_ptr<TileNumbers> numbers;
     const SpillList<uint64_t>* roots = &root;
+    head_tiles_ = first_[0].size();
     for (uint32_t level = 0; level < bricks; level = end_of(level)) {
       auto next = write_band(level, *roots);
       numbers = std::move(next);  // releases the numbers of the band above
@@ -87,14 +91,31 @@ class BandWriter {
     if (end + kBrickLevels < dag_.grid_levels())
       below = std::make_unique<TileNumbers>(file_, end, spec_.threads, space_, cancel_);
     packs_.begin_band(false, level);
+    if (below) number_first(level, end, roots, *below);
+    const uint64_t head_below = below ? below->count() : 0;
     SpillReader<uint64_t> reader(roots);
-    while (!reader.at_end()) {
-      write_window(level, take_roots(reader), below.get());
+    for (uint64_t number = 0; !reader.at_end(); number += kWindowBlocks * kBlockTiles) {
+      write_window(level, number, take_roots(reader), below.get());
       cancel_.check();
       if (resident_bytes() > spec_.memory_bytes) file_.release_pages();
     }
     if (below) below->offsets().finish();
+    head_tiles_ = head_below;
     return below;
+  }
+
+  // Gives the lowest numbers of the band below, whose tiles have their roots on `end`, to its tiles
+  // of the first picture. Only tiles of the first picture refer to them for the first time.
+  void number_first(uint32_t level, uint32_t end, const SpillList<uint64_t>& roots,
+                    TileNumbers& below) const {
+    SpillReader<uint64_t> reader(roots);
+    for (uint64_t i = 0; i < head_tiles_; ++i, reader.pop()) {
+      const auto tile = encode_tile(dag_, kPackageTileLevels, {level, reader.front()}, &blocks_);
+      for (size_t at = leaves_begin(tile); at < tile.size(); at += 4) {
+        const uint64_t offset = tile[at] | uint64_t{tile[at + 1]} << 32;
+        if (first_[end].contains(offset)) below.number(offset);
+      }
+    }
   }
 
   static std::vector<uint64_t> take_roots(SpillReader<uint64_t>& reader) {
@@ -104,7 +125,9 @@ class BandWriter {
     return offsets;
   }
 
-  void write_window(uint32_t level, const std::vector<uint64_t>& offsets, TileNumbers* below) {
+  // Writes the tiles with the roots `offsets`. `first` is the number of the first of them.
+  void write_window(uint32_t level, uint64_t first, const std::vector<uint64_t>& offsets,
+                    TileNumbers* below) {
     const size_t count = (offsets.size() + kBlockTiles - 1) / kBlockTiles;
     std::vector<Tiles> tiles(count);
     std::vector<uint32_t> next(count, 0);
@@ -127,8 +150,14 @@ class BandWriter {
       for (const std::vector<uint32_t>& tile : tiles[block]) encoder.add(tile);
       blocks[block] = gzip_block(encoder.finish());
     });
-    for (size_t block = 0; block < count; ++block)
-      packs_.add_block(blocks[block], tiles[block].size(), 0);
+    for (size_t block = 0; block < count; ++block) {
+      const uint64_t number = first + block * kBlockTiles;
+      if (number < head_tiles_)
+        packs_.add_head_block(blocks[block], tiles[block].size(),
+                              std::min<uint64_t>(kBlockTiles, head_tiles_ - number));
+      else
+        packs_.add_block(blocks[block], tiles[block].size(), 0);
+    }
     tiles_ += offsets.size();
     progress_.advance(offsets.size());
   }
@@ -150,6 +179,9 @@ class BandWriter {
   Progress& progress_;
   const CancelToken& cancel_;
   ColorBands colors_;
+  FirstTiles first_;  // the tiles of the first picture
+  uint64_t head_tiles_ =
+      0;  // number of these tiles in the current band; they have the first numbers
   uint64_t tiles_ = 0;
 };
 
@@ -161,9 +193,9 @@ void write_file(FileSystem& files, const std::string& path, std::string_view con
 }
 
 // Returns the digest of a package. It depends on the manifest and, through the hashes in the file
-// names, on the directory and all packs.
+// names, on the head, the directory and all packs.
 std::string digest_of(const PackageIndex& index) {
-  std::string text = index.manifest + index.directory.name;
+  std::string text = index.manifest + index.head.name + index.directory.name;
   for (const PackageFile& pack : index.packs) text += pack.name;
   return sha256_hex(text).substr(0, kDigestDigits);
 }
@@ -181,7 +213,7 @@ void complete_manifest(const PackageSpec& spec, PackageIndex& index) {
 PackageReport report_of(const PackageIndex& index) {
   PackageReport report;
   report.packs = index.packs.size();
-  report.bytes = index.directory.bytes;
+  report.bytes = index.head.bytes + index.directory.bytes;
   for (const PackageFile& pack : index.packs) report.bytes += pack.bytes;
   for (const PackageBand& band : index.bands) report.blocks += band.blocks;
   report.digest = parse_json<nlohmann::ordered_json>(index.manifest)["digest"];
@@ -223,7 +255,7 @@ PackageReport write_package(const voxdag_reader::File& file, const PackageSpec& 
     folder.publish(index);
     PackageReport report = report_of(index);
     report.bytes += bytes + text.size();
-    report.files = index.packs.size() + 2 + viewer.size();
+    report.files = index.packs.size() + 2 + viewer.size() + (index.head.name.empty() ? 0 : 1);
     report.tiles = bands.tiles();
     report.color_pages = bands.color_pages();
     return report;

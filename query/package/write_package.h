@@ -1,6 +1,6 @@
 // Writes the tiles and color pages of a global file as a package (package_index.h). The bytes of
-// the package depend only on the voxels and colors, on the members `manifest`, `colors` and
-// `pack_bytes` of PackageSpec, on the files of the viewer, and on the version of zlib.
+// the package depend only on the voxels and colors, on the members `manifest`, `camera`, `colors`
+// and `pack_bytes` of PackageSpec, on the files of the viewer, and on the version of zlib.
 //
 // Several threads encode the blocks of a band. PackageSpec::memory_bytes limits the memory. Only
 // the tile numbers of one band must fit in it (tile_numbers.h); other data is read in parts.
@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "core/format/global/voxdag_reader.h"
 #include "core/io/file_system.h"
 #include "query/package/package_index.h"
+#include "query/render/camera.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
@@ -31,6 +33,9 @@ struct PackageSpec {
   // The manifest for viewers (docs/api.md), as JSON. write_package() adds the digest. The member
   // "tile_levels" must be kPackageTileLevels.
   std::string manifest;
+  // The camera with which the viewer begins, in voxels. The head of the package has the tiles of
+  // its first picture (first_tiles.h). Without a camera, the package has no head.
+  std::optional<Placement> camera;
   bool colors = true;  // also write the colors, if the file has any
   uint64_t pack_bytes = uint64_t{8} << 20;
   uint64_t memory_bytes = uint64_t{1} << 30;

@@ -26,7 +26,10 @@ class Camera {
   // Returns the width of a pixel at distance 1.
   double pixel_spread() const { return pixel_; }
   const Vec& eye() const { return eye_; }
+  // Unit vectors along the axes of the picture.
   const Vec& forward() const { return forward_; }
+  const Vec& right() const { return right_; }
+  const Vec& up() const { return up_; }
 
  private:
   Vec eye_, forward_, right_, up_;

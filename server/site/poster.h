@@ -22,8 +22,8 @@ struct PosterFormat {
 // Returns the format of a poster, determined from its first bytes.
 PosterFormat format_of_poster(const std::string& poster);
 
-// Renders the view `auto`, whose camera is in the manifest of `spec`, and returns a JPEG file, or a
-// PNG file if this program was built without libjpeg. Returns "" if the file has no voxels. Throws
+// Renders the view of spec.camera, and returns a JPEG file, or a PNG file if this program was built
+// without libjpeg. Returns "" if the file has no voxels. Throws
 // Error{kCorrupt} for a damaged file, and Error{kCanceled}.
 std::string render_poster(const voxdag_reader::File& file, const query::PackageSpec& spec,
                           Progress& progress, const CancelToken& cancel);

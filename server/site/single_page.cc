@@ -39,6 +39,7 @@ uint64_t write_page(const std::string& package, const PageContents& contents,
                     const std::string& path, FileSystem& files, const CancelToken& cancel) {
   const query::PackageIndex index = query::PackageReader(files, package).index();
   std::vector<std::string> names = {query::kIndexName, index.directory.name};
+  if (!index.head.name.empty()) names.push_back(index.head.name);
   for (const query::PackageFile& pack : index.packs) names.push_back(pack.name);
   const std::string page = page_with_module(contents), end = "</body>";
   const size_t data = page.rfind(end);

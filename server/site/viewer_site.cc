@@ -4,6 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "query/package/gzip_block.h"
 #include "server/site/base64.h"
 #include "server/site/module_bundle.h"
 #include "server/site/poster.h"
@@ -102,7 +103,7 @@ std::string preview_elements(const PageContents& contents, const std::string& po
 
 // Returns the content of the element <head> for the page of a package. `url` is the URL of the
 // folder of the package (web/viewer/package/published.js). `elements` are further elements, among
-// them the element <script> with the viewer.
+// them the element <script> that starts the viewer.
 std::string head_of(const std::string& title, const std::string& url, const std::string& elements) {
   std::string head = "  <title>" + escaped(title) + "</title>\n";
   head += "  <meta name=\"voxdag-package\" content=\"" + url + "\">\n";
@@ -114,14 +115,23 @@ std::string head_of(const std::string& title, const std::string& url, const std:
 }
 
 std::string viewer_module() { return bundle_modules("viewer/package/main.js", asset); }
+std::string start_module() { return bundle_modules("viewer/package/start.js", asset); }
 
 }  // namespace
 
 std::vector<query::ViewerFile> viewer_site(const PageContents& contents) {
-  const std::string module = viewer_module();
-  const std::string name = query::hashed_name("viewer", module, ".js");
-  const std::string script = "  <script type=\"module\" src=\"" + name + "\"></script>\n";
-  std::vector<query::ViewerFile> files = {{name, module}};
+  const std::string module = viewer_module(), compressed = query::gzip_block(module),
+                    start = start_module();
+  std::vector<query::ViewerFile> files = {
+      {query::hashed_name("start", start, ".js"), start},
+      {query::hashed_name("viewer", compressed, ".bin"), compressed},
+      {query::hashed_name("viewer", module, ".js"), module}};
+  // Without the preload, the browser would request the module only after start.js has arrived.
+  const std::string scripts =
+      "  <link rel=\"preload\" href=\"" + files[1].name +
+      "\" as=\"fetch\" crossorigin>\n  <meta name=\"voxdag-viewer\" content=\"" + files[1].name +
+      " " + files[2].name + "\">\n  <script type=\"module\" src=\"" + files[0].name +
+      "\"></script>\n";
   std::string poster;
   if (!contents.poster.empty()) {
     poster =
@@ -129,19 +139,21 @@ std::vector<query::ViewerFile> viewer_site(const PageContents& contents) {
     files.push_back({poster, contents.poster});
   }
   const std::string head =
-      head_of(contents.title, "./", preview_elements(contents, poster) + script);
+      head_of(contents.title, "./", preview_elements(contents, poster) + scripts);
   files.push_back({"index.html", page_of(head, poster_element(poster))});
   return files;
 }
 
 std::string page_with_module(const PageContents& contents) {
-  const std::string script = "  <script type=\"module\">\n" + viewer_module() + "</script>\n";
+  const std::string scripts = "  <script type=\"module\">\n" + start_module() +
+                              "</script>\n  <script type=\"text/plain\" data-module>" +
+                              base64_of(query::gzip_block(viewer_module())) + "</script>\n";
   const std::string poster = contents.poster.empty()
                                  ? ""
                                  : std::string("data:") +
                                        format_of_poster(contents.poster).media_type + ";base64," +
                                        base64_of(contents.poster);
-  return page_of(head_of(contents.title, "", script), poster_element(poster));
+  return page_of(head_of(contents.title, "", scripts), poster_element(poster));
 }
 
 }  // namespace voxdag::server

@@ -45,6 +45,18 @@ nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& vie
           {"fov_degrees", p.fov_degrees}};
 }
 
+query::Placement placement_of(const nlohmann::json& camera, const voxdag_reader::File& file) {
+  const auto voxels = [&](const nlohmann::json& point) {
+    query::Vec position;
+    for (int axis = 0; axis < 3; ++axis)
+      position[axis] = (point.at(static_cast<size_t>(axis)).get<double>() - file.origin()[axis]) *
+                       static_cast<double>(file.resolution()) / file.edge();
+    return position;
+  };
+  return {voxels(camera.at("position")), voxels(camera.at("target")),
+          camera.at("fov_degrees").get<double>()};
+}
+
 nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const query::DagView& dag,
                                      const std::string& digest, const CancelToken& cancel) {
   const GridPlace place{{file.origin()[0], file.origin()[1], file.origin()[2]}, file.edge()};

@@ -34,6 +34,9 @@ nlohmann::ordered_json camera_of(const std::string& view, query::NamedViews& vie
                                  const query::DagView& dag, const GridPlace& place,
                                  double aspect = kWideAspect);
 
+// Returns the placement, in voxels, of a camera that camera_of() has returned for a file.
+query::Placement placement_of(const nlohmann::json& camera, const voxdag_reader::File& file);
+
 // Returns the manifest of a file. Computing its cameras takes up to a second, or longer if the file
 // must first be read from the disk.
 nlohmann::ordered_json file_manifest(const voxdag_reader::File& file, const query::DagView& dag,

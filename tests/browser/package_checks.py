@@ -14,8 +14,14 @@ from picture_checks import HEIGHT, MIN_EQUAL_DEPTH, PLAIN, WIDTH, assert_equal, 
 #   whole:      with the complete file, like `python -m http.server`
 #   compressed: with a range of the compressed file, like some content delivery networks
 #   refused:    with an error
-HOSTS = ["ranges", "whole", "compressed", "refused"]
-CHECKED_HOSTS = ["ranges", "compressed"]  # to save time
+#   strict:     with the range; and with a policy that forbids modules of blob: URLs
+HOSTS = ["ranges", "whole", "compressed", "refused", "strict"]
+CHECKED_HOSTS = ["ranges", "compressed", "strict"]  # to save time
+HOSTS_OF_RANGES = ["ranges", "strict"]
+POLICY = (
+    "default-src 'none'; script-src 'self'; connect-src 'self'; img-src 'self' data:; "
+    "style-src 'unsafe-inline'"
+)
 PUBLIC_URL = "https://example.org/scene"
 RANGE = re.compile(r"bytes=(\d+)-(\d+)$")
 
@@ -38,6 +44,8 @@ class Handler(SimpleHTTPRequestHandler):
     def end_headers(self):
         self.send_header("Access-Control-Allow-Origin", "*")
         self.send_header("Cache-Control", "no-store")
+        if self.host == "strict":
+            self.send_header("Content-Security-Policy", POLICY)
         super().end_headers()
 
     def do_GET(self):
@@ -77,21 +85,54 @@ def serve(folder, host):
 
 
 def check_host(visitor, url, host, camera, reference):
-    """The picture is the same from every server, and the page requests no range in vain."""
-    ranges = []
+    """The picture is the same from every server, and the page requests no range in vain. Loads the
+    compressed viewer, unless the policy of the server forbids it."""
+    ranges, modules = [], []
     visitor.page.on("request", lambda request: ranges.append(request.headers.get("range")))
+    visitor.page.on(
+        "request",
+        lambda request: modules.extend(re.findall(r"/viewer-[0-9a-f]+(\.js)$", request.url)),
+    )
     visitor.open(f"{url}/{PLAIN}")
     visitor.show(camera)
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(reference, depths, camera, f"a package from a server of kind {host}")
     count = len([each for each in ranges if each])
-    assert (count > 1) == (host == "ranges"), f"{host}: {count} requests for ranges"
+    assert (count > 1) == (host in HOSTS_OF_RANGES), f"{host}: {count} requests for ranges"
+    assert len(modules) == (host == "strict"), f"{host}: {len(modules)} plain modules"
+    if host == "strict":
+        violations = visitor.page.evaluate("window.violations.splice(0)")
+        assert violations == ["script-src-elem blob"], violations
+
+
+def check_single_file(visitor, walk, city, camera, reference):
+    """A page that contains its package shows the same picture without a web server."""
+    path = walk.folder / "single.html"
+    walk.voxdag.run("publish", city.built, "-o", path, "--single-file")
+    visitor.open(f"{path.as_uri()}{PLAIN}")
+    visitor.show(camera)
+    depths, _ = visitor.capture(WIDTH, HEIGHT)
+    assert_equal(reference, depths, camera, "a package in one file")
+
+
+def check_first_picture(visitor, url):
+    """The page draws the first picture with the tiles of the head, without a request for a pack."""
+    page, requests = visitor.page, []
+    page.route("**/packs/*", lambda route: route.abort())
+    page.on("request", lambda request: requests.append(request.url.removeprefix(url)))
+    with visitor.expecting("ERR_FAILED"):
+        visitor.open(f"{url}/")
+        visitor.wait_until("window.voxdagViewer?.renderer.measured.hasFirstPicture")
+    early = [each for each in requests if not each.startswith("/packs/")]
+    kinds = sorted(re.split(r"[-.]", each[1:] or "index")[0] for each in early)
+    expected = ["directory", "head", "index", "package", "poster", "start", "viewer"]
+    assert kinds == expected, kinds
 
 
 def check_poster(visitor, url):
     """The page shows the poster until the viewer has drawn."""
     page, scripts = visitor.page, []
-    page.route("**/viewer-*.js", lambda route: scripts.append(route))
+    page.route("**/viewer-*.bin", lambda route: scripts.append(route))
     page.goto(f"{url}/", wait_until="commit")
     visitor.wait_until("document.getElementById('poster')?.naturalWidth === 640")
     image = page.locator('meta[property="og:image"]').get_attribute("content")
@@ -129,7 +170,8 @@ def check_packages(walk, city):
     for host in CHECKED_HOSTS:
         with serve(folder, host) as url:
             visitor = walk.visitor(f"package-{host}")
-            with visitor.expecting("416" if host == "refused" else "nothing"):
+            errors = {"refused": "416", "strict": "blob:"}
+            with visitor.expecting(errors.get(host, "nothing")):
                 check_host(visitor, url, host, camera, reference)
             visitor.leave()
         walk.say(f"a package from a server of kind {host}")
@@ -138,6 +180,15 @@ def check_packages(walk, city):
         check_poster(visitor, url)
         visitor.leave()
         walk.say("the poster of a package")
+    with serve(folder, "ranges") as url:
+        visitor = walk.visitor("package-first", width=400, height=200)
+        check_first_picture(visitor, url)
+        visitor.leave()
+        walk.say("the first picture of a package")
+    visitor = walk.visitor("package-single")
+    check_single_file(visitor, walk, city, camera, reference)
+    visitor.leave()
+    walk.say("a package in one file")
     with serve(folder, "ranges") as url:
         visitor = walk.visitor("package-missing")
         with visitor.expecting("404"):

@@ -64,7 +64,7 @@ TEST_F(View, RefusesWhatItCannotShow) {
 TEST_F(View, IsPublished) {
   const Json report = run_json(
       {"publish", "m.vdag", "-o", "p", "--title", "A <sphere>", "--url", "https://example.org/p"});
-  EXPECT_EQ(report["files"], 6);
+  EXPECT_EQ(report["files"], 8);
   EXPECT_NE(contents("p/index.html").find("content=\"https://example.org/p/poster-"),
             std::string::npos);
   const Json checked = run_json({"publish", "--check", "p"});

@@ -243,10 +243,18 @@ void add_package(const Corpus& corpus, const std::string& name, const std::strin
       query::gunzip_block(read_bytes(folder + "/" + index.directory.name), kMaxBytes);
   std::string packs, complete = section_of(text) + section_of(page);
   for (const query::PackageFile& pack : index.packs) packs += read_bytes(folder + "/" + pack.name);
+  const std::string head =
+      index.head.name.empty() ? "" : read_bytes(folder + "/" + index.head.name);
+  size_t head_offset = 0;
+  for (const uint16_t size : index.head.lengths) {
+    complete += section_of(query::gunzip_block(head.substr(head_offset, size), kMaxBytes));
+    head_offset += size;
+  }
   size_t block = 0, offset = 0;
   for (const query::PackageBand& band : index.bands) {
     std::string plain;
-    for (uint64_t i = 0; i < band.blocks; ++i, ++block) {
+    if (band.pack_blocks() == 0) continue;
+    for (uint64_t i = 0; i < band.pack_blocks(); ++i, ++block) {
       uint16_t size = 0;
       std::memcpy(&size, page.data() + sizeof size * block, sizeof size);
       const std::string packed = packs.substr(offset, size);
@@ -267,8 +275,9 @@ void add_package(const Corpus& corpus, const std::string& name, const std::strin
 
 void add_packages(const Corpus& corpus) {
   TemporaryFolder folder;
-  for (const uint32_t levels : {4u, 6u}) {
-    const std::string name = std::to_string(1 << levels), path = folder.file(name);
+  for (const auto& [name, levels, has_head] :
+       {std::tuple{"16", 4u, false}, {"64", 6u, false}, {"64_head", 6u, true}}) {
+    const std::string path = folder.file(name);
     write_colored(path + ".vdag",
                   {levels, levels, random_codes(levels, levels, 30), smooth_colors(levels, 9)},
                   true);
@@ -276,6 +285,7 @@ void add_packages(const Corpus& corpus) {
     query::PackageSpec spec;
     spec.output = path;
     spec.manifest = "{\"levels\":" + std::to_string(levels) + ",\"tile_levels\":2}";
+    if (has_head) spec.camera = query::Placement{{{90, 70, 120}}, {{32, 32, 32}}, 35};
     NoProgress progress;
     query::write_package(*file, spec, {}, system_files(), progress, CancelToken());
     add_package(corpus, name, path, levels);

@@ -4,12 +4,12 @@
 //     1   a block of tiles: levels of the grid, level of the tiles, number of tiles, plain bytes
 //     2   a block of color pages: plain bytes
 //     3   a compressed block
-//     4   a complete package of at most kMaxBlocks blocks
+//     4   a complete package of at most kMaxBlocks blocks in its pack and in its head
 //
 // The sections of a complete package are stored one after the other, each after its size (32 bits):
-// package.json, the plain page of the directory, and the plain blocks. The target compresses page
-// and blocks, and corrects names, sizes and offsets, so that a mutation reaches the code after
-// these checks.
+// package.json, the plain page of the directory, the plain blocks of the head, and the plain blocks
+// of the pack. The target compresses page and blocks, and corrects names, sizes and offsets, so
+// that a mutation reaches the code after these checks.
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -74,7 +74,7 @@ std::string take_section(std::string_view& bytes) {
 
 // Takes the next `blocks` sections and compresses them as the blocks of one pack. Writes the sizes
 // of these blocks to `page`, the plain page of the directory.
-std::string make_pack(query::PackageIndex& index, uint64_t blocks, std::string_view sections,
+std::string make_pack(query::PackageIndex& index, uint64_t blocks, std::string_view& sections,
                       std::string& page) {
   std::string pack;
   for (uint64_t i = 0; i < blocks; ++i) {
@@ -86,6 +86,21 @@ std::string make_pack(query::PackageIndex& index, uint64_t blocks, std::string_v
   }
   index.packs = {{query::hashed_name("pack", pack, ".bin"), pack.size(), blocks}};
   return pack;
+}
+
+// Takes the next sections and compresses them as the blocks of the head.
+std::string make_head(query::PackageIndex& index, std::string_view& sections) {
+  std::string head;
+  for (uint16_t& length : index.head.lengths) {
+    const std::string block = query::gzip_block(take_section(sections));
+    length = static_cast<uint16_t>(block.size());
+    head += block;
+  }
+  if (!index.head.name.empty()) {
+    index.head.name = query::hashed_name("head", head, ".bin");
+    index.head.bytes = head.size();
+  }
+  return head;
 }
 
 // Compresses `page` as the directory.
@@ -114,21 +129,25 @@ void read_folder() {
 void read_package(std::string_view sections) {
   query::PackageIndex index = query::parse_index(take_section(sections), "package.json");
   uint64_t blocks = 0;
-  for (const query::PackageBand& band : index.bands) blocks += band.blocks;
-  if (blocks > kMaxBlocks) return;
+  for (const query::PackageBand& band : index.bands) blocks += band.pack_blocks();
+  if (blocks > kMaxBlocks || index.head.lengths.size() > kMaxBlocks) return;
   index.viewer.clear();
   std::string page = take_section(sections);
-  const std::string pack = make_pack(index, blocks, sections, page),
+  const std::string head = make_head(index, sections),
+                    pack = make_pack(index, blocks, sections, page),
                     directory = make_directory(index, page), pack_name = index.packs[0].name;
   write("package.json", query::index_text(index));
   write(index.directory.name, directory);
   write(pack_name, pack);
+  if (!index.head.name.empty()) write(index.head.name, head);
   try {
     read_folder();
   } catch (const Error&) {
   }
   std::filesystem::remove(fuzz::memory_folder() + "/" + index.directory.name);
   std::filesystem::remove(fuzz::memory_folder() + "/" + pack_name);
+  if (!index.head.name.empty())
+    std::filesystem::remove(fuzz::memory_folder() + "/" + index.head.name);
 }
 
 void read(int decoder, std::string_view bytes) {

@@ -4,6 +4,7 @@
 import {length, pictureAxes, pictureDirection, subtract} from "../vector.js";
 
 const kFar = 2 ** 30;  // max magnitude of the eye's coordinates, in voxels
+const kNear = 1e-4;  // max difference of views that isNear() compares, relative to the grid's edge
 
 export class View {
   // Positions are in voxels; the vertical field of view is in degrees.
@@ -43,6 +44,14 @@ export class View {
   direction(x, y, width, height) {
     const pixel = this.pixel(height);
     return pictureDirection(this, (x - width / 2) * pixel, (height / 2 - y) * pixel);
+  }
+
+  // True if the pictures of both views need almost the same cells. `edge` is the edge of the grid.
+  isNear(other, edge) {
+    const isClose = (name, most) =>
+        this[name].every((x, i) => Math.abs(x - other[name][i]) <= most);
+    return isClose("eye", kNear * edge) && isClose("forward", kNear) &&
+        Math.abs(this.tangent - other.tangent) <= kNear;
   }
 
   equals(other) {

@@ -1,37 +1,75 @@
-// The directory of a package (docs/format.md, "Packages"), which has the position of each block. A
-// small directory is fetched in one piece, a large one page by page.
+// The directory of a package (docs/format.md, "Packages"), which has the position of each block in
+// the packs. Its pages are fetched when they are needed, several neighboring pages with one
+// request. The index of the package has the positions of the blocks in the head.
+//
+// A block has a number. Blocks in packs have the numbers 0, 1, ..., in the order in which they are
+// stored. The n blocks in the head have the numbers -n, ..., -1.
 
 import {TileError} from "../tile_source.js";
 
 import {gunzip} from "./block_format.js";
 
 const kPageBlocks = 4096;
-const kMaxWholeBytes = 1 << 20;
+const kBlockTiles = 64;
+const kGroupBytes = 1 << 16;  // minimum size of the pages that one request fetches
 
 export class Directory {
-  constructor(files, {bands, directory, packs}) {
+  constructor(files, {bands, head, directory, packs}) {
     Object.assign(this, {files, bands, packs});
+    this.head = head ? {name: head.name, bytes: head.bytes} : null;
+    this.headLengths = head?.blocks ?? [];
     this.file = {name: directory.name, bytes: directory.bytes};
     this.pages = directory.pages;
     this.loaded = new Map();  // page -> promise of the result of parse()
-    this.blockCount = 0;
-    this.firstBlocks = [];  // by band: its first block
-    for (const {blocks} of bands) {
-      this.firstBlocks.push(this.blockCount);
-      this.blockCount += blocks;
-    }
+    this.blockCount = 0;      // in packs
+    this.firstBlocks = [];    // by band: its first block in a pack
+    this.headBlocks = [];     // by band: the number of its blocks in the head
+    this.headBegins = [];     // by band: the index of its first block in the head
     let at = 0;
+    for (const {blocks, head_tiles: headTiles = 0} of bands) {
+      const inHead = Math.ceil(headTiles / kBlockTiles);
+      this.headBlocks.push(inHead);
+      this.headBegins.push(at);
+      at += inHead;
+      this.firstBlocks.push(this.blockCount);
+      this.blockCount += blocks - inHead;
+    }
+    if (at !== this.headLengths.length) throw new TileError(200, "The package has a wrong head.");
+    at = 0;
+    this.headOffsets = this.headLengths.map((length) => (at += length) - length);
+    at = 0;
     this.offsets = this.pages.map(({bytes}) => (at += bytes) - bytes);
+    this.groups = groupsOf(this.pages);  // by page: [first page, last page] of its group
     at = 0;
     this.packBlocks = packs.map(({blocks}) => (at += blocks) - blocks);  // by pack: its first block
   }
 
-  // Resolves to {pack, offset, bytes}: the pack of a block, its offset in the pack, and its
-  // compressed size.
+  // Returns the number of the block that has a tile of a band.
+  tileBlock(band, tile) {
+    const i = Math.floor(tile / kBlockTiles), inHead = this.headBlocks[band];
+    return i < inHead ? this.headBegins[band] + i - this.headLengths.length :
+                        this.firstBlocks[band] + i - inHead;
+  }
+
+  // Returns {band, index}: the band of a block, and the index of the block in this band.
+  bandOf(block) {
+    const isInHead = block < 0, begins = isInHead ? this.headBegins : this.firstBlocks;
+    const at = isInHead ? block + this.headLengths.length : block;
+    const band = begins.findLastIndex((first) => first <= at);
+    return {band, index: at - begins[band] + (isInHead ? 0 : this.headBlocks[band])};
+  }
+
+  // Resolves to {file, offset, bytes}: the file of a block, {name, bytes}, the offset of the block
+  // in this file, and its compressed size.
   async place(block, options) {
+    if (block < 0) {
+      const at = block + this.headLengths.length;
+      return {file: this.head, offset: this.headOffsets[at], bytes: this.headLengths[at]};
+    }
     const page = Math.floor(block / kPageBlocks), entries = await this.page(page, options);
     const i = block - page * kPageBlocks;
-    return {pack: entries.packs[i], offset: entries.offsets[i], bytes: entries.lengths[i]};
+    const file = this.packs[entries.packs[i]];
+    return {file, offset: entries.offsets[i], bytes: entries.lengths[i]};
   }
 
   // Resolves to the only block of a color band that can contain the page with the Morton code
@@ -52,20 +90,26 @@ export class Directory {
   }
 
   page(page, options) {
-    if (!this.loaded.has(page)) {
-      const loads = this.load(page, options);
-      this.loaded.set(page, loads);
-      loads.catch(() => this.loaded.delete(page));
-    }
+    if (!this.loaded.has(page)) this.loadGroup(page, options);
     return this.loaded.get(page);
   }
 
-  async load(page, options) {
-    const {files, file} = this, isWhole = file.bytes <= kMaxWholeBytes;
-    const offset = this.offsets[page], {bytes} = this.pages[page];
-    const part = isWhole ?
-        (await files.read(file, 0, file.bytes, options)).subarray(offset, offset + bytes) :
-        await files.read(file, offset, bytes, options);
+  // Begins to load all pages of the group of `page`.
+  loadGroup(page, options) {
+    const [first, last] = this.groups[page], begin = this.offsets[first];
+    const reads = this.files.read(
+        this.file, begin, this.offsets[last] + this.pages[last].bytes - begin, options);
+    for (let each = first; each <= last; ++each) {
+      const loads = this.load(each, reads, begin);
+      this.loaded.set(each, loads);
+      loads.catch(() => this.loaded.delete(each));
+    }
+  }
+
+  // Takes a page from the bytes of its group. These begin at the offset `begin` of the directory.
+  async load(page, reads, begin) {
+    const offset = this.offsets[page] - begin;
+    const part = (await reads).subarray(offset, offset + this.pages[page].bytes);
     try {
       return this.parse(page, await gunzip(part));
     } catch (error) {
@@ -114,4 +158,18 @@ export class Directory {
     });
     return flags;
   }
+}
+
+// Divides the pages of a directory into groups. The first page, which every view needs, is a group.
+// Returns, for each page, the first and the last page of its group.
+function groupsOf(pages) {
+  const groups = [];
+  while (groups.length < pages.length) {
+    const first = groups.length;
+    let last = first, bytes = pages[first].bytes;
+    while (first > 0 && last + 1 < pages.length && bytes < kGroupBytes)
+      bytes += pages[++last].bytes;
+    while (groups.length <= last) groups.push([first, last]);
+  }
+  return groups;
 }

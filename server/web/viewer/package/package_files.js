@@ -7,7 +7,7 @@
 import {TileError} from "../tile_source.js";
 
 const kTimeoutMs = 30000;         // maximum time without new data of an answer
-const kSmallFile = 256 * 1024;    // files up to this size are fetched completely
+const kSmallFile = 64 * 1024;     // files up to this size are fetched completely
 const kMaxWholeBytes = 64 << 20;  // limit for complete files in memory; the newest may exceed it
 const kMaxRequests = 6;           // maximum number of concurrent requests
 

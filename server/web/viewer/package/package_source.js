@@ -9,7 +9,7 @@ import {tileShape} from "../tiles/tile_format.js";
 import {decodeColorBlock, gunzip, mortonCode, TileBlock} from "./block_format.js";
 import {Directory} from "./directory.js";
 
-const kFormat = "voxdag package", kVersion = 1;
+const kFormat = "voxdag package", kVersions = [1, 2];
 const kBlockTiles = 64;
 const kMaxGap = 16 * 1024;         // maximum bytes between two blocks of one request
 const kMaxRange = 1 << 20;         // maximum bytes of one request
@@ -56,6 +56,10 @@ export class PackageSource {
   }
 
   async manifest() {
+    if (!window.DecompressionStream)
+      throw new Error(
+          "This browser is too old: the viewer needs DecompressionStream, which browsers have " +
+          "since 2023.");
     const index = await this.fetchIndex();
     checkManifest(index.manifest);
     this.info = index.manifest;
@@ -66,12 +70,21 @@ export class PackageSource {
     return this.info;
   }
 
-  // Begins to load the first page of the directory and the first pack, because every view needs
-  // them.
+  // Begins to load the head and the first page of the directory, because every view needs them. In
+  // a package of version 1, loads the first pack instead of the head.
   warmUp() {
-    if (this.packs.length === 0) return;
-    this.directory.page(0).catch(() => {});
-    this.files.read(this.packs[0], 0, this.packs[0].bytes).catch(() => {});
+    const file = this.directory.head ?? this.packs[0];
+    if (file) this.files.read(file, 0, file.bytes).catch(() => {});
+    if (this.packs.length > 0) this.directory.page(0).catch(() => {});
+  }
+
+  // True if the first picture of the camera in the manifest needs the tile.
+  isFirstTile({level, offset}) {
+    return this.bands.some((band) => band.level === level && offset < band.head_tiles);
+  }
+  // True if the package knows the tiles of the first picture.
+  get knowsFirstTiles() {
+    return this.directory.head !== null;
   }
 
   async fetchIndex(signal) {
@@ -81,9 +94,9 @@ export class PackageSource {
     } catch (error) {
       if (error instanceof TileError) throw error;
     }
-    if (index?.format !== kFormat || index.version !== kVersion)
+    if (index?.format !== kFormat || !kVersions.includes(index.version))
       throw new TileError(
-          200, `package.json is not the index of a package of version ${kVersion}.`);
+          200, `package.json is not the index of a package of version ${kVersions.join(" or ")}.`);
     return index;
   }
 
@@ -95,7 +108,7 @@ export class PackageSource {
       const band = this.bandOf(level, "tiles");
       if (!(offset < this.bands[band].tiles))
         throw new TileError(404, `Level ${level} has no tile ${offset}.`);
-      return this.directory.firstBlocks[band] + Math.floor(offset / kBlockTiles);
+      return this.directory.tileBlock(band, offset);
     }, (block, {offset}) => block.tile(offset % kBlockTiles));
   }
 
@@ -166,9 +179,9 @@ export class PackageSource {
   }
 
   fetchGroup(group, options) {
-    const {pack, offset} = group[0], last = group.at(-1);
+    const {file, offset} = group[0], last = group.at(-1);
     const length = last.offset + last.bytes - offset;
-    const read = () => this.files.read(this.packs[pack], offset, length, options);
+    const read = () => this.files.read(file, offset, length, options);
     const reads = read();
     for (const each of group) {
       const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
@@ -198,13 +211,10 @@ export class PackageSource {
   }
 
   parse(block, plain) {
-    const {firstBlocks} = this.directory;
-    const band = firstBlocks.findLastIndex((first) => first <= block);
-    const {level, tiles} = this.bands[band];
+    const {band, index} = this.directory.bandOf(block), {level, tiles} = this.bands[band];
     if (tiles === undefined) return decodeColorBlock(plain);
-    const first = (block - firstBlocks[band]) * kBlockTiles;
-    return new TileBlock(
-        plain, level, tileShape(this.info, level), Math.min(kBlockTiles, tiles - first));
+    const count = Math.min(kBlockTiles, tiles - index * kBlockTiles);
+    return new TileBlock(plain, level, tileShape(this.info, level), count);
   }
 
   // Removes the least recently used blocks from this.blocks until the remaining blocks have at most
@@ -256,13 +266,13 @@ function isOfOneItem(error) {
 }
 
 // Sorts the places of blocks and divides them into groups. The blocks of a group are close together
-// in one pack and are fetched with one request.
+// in one file and are fetched with one request.
 function merged(places) {
-  places.sort((a, b) => a.pack - b.pack || a.offset - b.offset);
+  places.sort((a, b) => a.block - b.block);
   const groups = [];
   for (const place of places) {
     const group = groups.at(-1), first = group?.[0], last = group?.at(-1);
-    const isClose = group && first.pack === place.pack &&
+    const isClose = group && first.file === place.file &&
         place.offset - last.offset - last.bytes <= kMaxGap &&
         place.offset + place.bytes - first.offset <= kMaxRange;
     if (isClose) group.push(place);

@@ -2,7 +2,9 @@
 // the first view, and then the tiles that each reading of the feedback (gl/feedback.js) reports as
 // missing. A new context gets a new stream.
 
+import {GridSpace} from "../camera_text.js";
 import {colorBudget, Colors} from "../colors/colors.js";
+import {View} from "../gl/view.js";
 import {FirstView} from "../tiles/first_view.js";
 import {TileLoader} from "../tiles/tile_loader.js";
 import {TilePool} from "../tiles/tile_pool.js";
@@ -61,9 +63,19 @@ export class TileStream {
   // feedback of a frame.
   seekFirstView(rootWords, view, size) {
     const {levels} = this.info, finestLevel = Math.min(levels, this.options.maxLevel ?? levels);
-    this.loader.firstView = new FirstView(this.info, view, size, 2 ** (levels - finestLevel));
+    this.loader.firstView =
+        new FirstView(this.info, view, size, 2 ** (levels - finestLevel), this.firstTiles(view));
     this.loader.firstView.begin(this.store, this.store.root, rootWords);
     this.continueFirstView();
+  }
+
+  // Returns a function that is true for the tiles that a view needs first; undefined if the source
+  // of the tiles does not know them.
+  firstTiles(view) {
+    const {info, loader: {source}} = this;
+    if (!source.knowsFirstTiles || !info.camera) return undefined;
+    const camera = new View(new GridSpace(info).placement(info.camera));
+    return view.isNear(camera, info.resolution) ? (node) => source.isFirstTile(node) : undefined;
   }
 
   // Requests more tiles of the first view, unless it is complete.

@@ -11,9 +11,10 @@ const kHeadWords = 4, kCutWords = 4;  // in a tile (docs/format.md)
 
 export class FirstView {
   // Searches for the tiles that `view` (gl/view.js) needs in a picture of this size. Cells with an
-  // edge of `finest` voxels are not refined.
-  constructor({levels}, view, {width, height}, finest) {
-    Object.assign(this, {levels, view, finest});
+  // edge of `finest` voxels are not refined. If `isFirst` is given, requests only the tiles for
+  // which isFirst({level, offset}) is true.
+  constructor({levels}, view, {width, height}, finest, isFirst = () => true) {
+    Object.assign(this, {levels, view, finest, isFirst});
     this.pixel = view.pixel(height);
     // Slopes of the sides of the picture: the tangents of half the horizontal and vertical field of
     // view.
@@ -73,6 +74,7 @@ export class FirstView {
   }
 
   want(store, node, pixels, corner) {
+    if (!this.isFirst(node)) return;
     this.wanted.set(node.texel, Math.max(pixels, this.wanted.get(node.texel) || 0));
     const places = this.places.get(node.key);
     if (places) places.push(corner);

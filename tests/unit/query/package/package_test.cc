@@ -19,98 +19,11 @@
 #include "tests/support/error_of.h"
 #include "tests/support/faulty_files.h"
 #include "tests/unit/core/format/color/colored_files.h"
+#include "tests/unit/query/package/package_fixture.h"
 #include "tests/unit/query/query_files.h"
 
 namespace voxdag::query {
 namespace {
-
-namespace fs = std::filesystem;
-using PackageWords = std::vector<uint32_t>;
-
-class Package : public testing::Test {
- protected:
-  std::string path(const std::string& name) const { return folder_.file(name); }
-  PackageSpec spec(const voxdag_reader::File& file, const std::string& output) const {
-    nlohmann::ordered_json manifest = {{"levels", file.grid_levels()}, {"tile_levels", 2}};
-    if (file.has_colors()) manifest["colors"] = {{"levels", file.color_levels()}};
-    PackageSpec spec;
-    spec.output = path(output);
-    spec.manifest = manifest.dump();
-    spec.memory_bytes = uint64_t{64} << 20;
-    return spec;
-  }
-  PackageReport write(const voxdag_reader::File& file, const PackageSpec& spec) {
-    return write_package(
-        file, spec, [&] { return viewer_; }, system_files(), progress_, never_);
-  }
-  void write_random(const std::string& output, int edge = 128) {
-    const QueryFile scene(random_voxels(5, edge));
-    const auto file = open_global_file(scene.path());
-    write(*file, spec(*file, output));
-  }
-  void check(const std::string& output) {
-    PackageReader(system_files(), path(output)).check(progress_, never_);
-  }
-  std::string check_error(const std::string& output) {
-    return error_of([&] { check(output); }).message();
-  }
-  std::vector<std::string> names(const std::string& folder) const {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::recursive_directory_iterator(folder))
-      if (entry.is_regular_file()) names.push_back(fs::relative(entry.path(), folder));
-    std::sort(names.begin(), names.end());
-    return names;
-  }
-  std::map<std::string, std::string> contents(const std::string& output) const {
-    std::map<std::string, std::string> contents;
-    for (const std::string& name : names(path(output)))
-      contents[name] = read_bytes(path(output) + "/" + name);
-    return contents;
-  }
-  std::string file_that_begins(const std::string& output, const std::string& begin) const {
-    for (const std::string& name : names(path(output)))
-      if (name.starts_with(begin)) return path(output) + "/" + name;
-    ADD_FAILURE() << begin;
-    return "";
-  }
-
-  TemporaryFolder folder_;
-  NoProgress progress_;
-  CancelToken never_;
-  std::vector<ViewerFile> viewer_;
-};
-
-// Compares all tiles of a package with the results of encode_tile(). Returns the number of tiles.
-uint64_t compare_tiles(const voxdag_reader::File& file, const PackageReader& package) {
-  const DagView dag(file);
-  const uint32_t bricks = file.brick_level();
-  std::vector<uint64_t> offsets = {0};  // word offsets of the current band's roots, by tile number
-  uint64_t count = 0;
-  for (uint32_t level = 0; level < bricks;) {
-    std::map<uint64_t, uint64_t> below;  // number -> word offset
-    for (uint64_t number = 0; number < offsets.size(); ++number, ++count) {
-      PackageWords expected = encode_tile(dag, kPackageTileLevels, {level, offsets[number]});
-      PackageWords tile = package.tile(level, number);
-      EXPECT_EQ(tile.size(), expected.size());
-      if (!(tile.at(1) >> 16 & 1))
-        for (size_t at = 4 + tile[2]; at < tile.size(); at += 4) {
-          const uint64_t offset = expected.at(at) | uint64_t{expected[at + 1]} << 32;
-          EXPECT_EQ(below.emplace(tile[at], offset).first->second, offset);
-          tile[at] = expected[at];
-          tile[at + 1] = expected[at + 1];
-        }
-      EXPECT_EQ(tile, expected) << level << " " << number;
-    }
-    level = tile_end(file.grid_levels(), kPackageTileLevels, level);
-    offsets.clear();
-    for (const auto& [number, offset] : below) {
-      EXPECT_EQ(number, offsets.size());
-      offsets.push_back(offset);
-    }
-    EXPECT_EQ(offsets.size(), level < bricks ? file.level(level).node_count : 0);
-  }
-  return count;
-}
 
 TEST_F(Package, HasTheTilesOfTheFile) {
   for (const int edge : {8, 16, 64, 128}) {
@@ -175,13 +88,13 @@ TEST_F(Package, IsTheSameForAnyRun) {
   const oracle::Voxels voxels = random_voxels(3, 128);
   const QueryFile scene(voxels), wide(voxels, 64);
   const auto file = open_global_file(scene.path()), wide_file = open_global_file(wide.path());
-  write(*file, spec(*file, "a"));
-  PackageSpec other = spec(*file, "b");
+  write(*file, spec_with_head(*file, "a"));
+  PackageSpec other = spec_with_head(*file, "b");
   other.threads = 4;
   other.list_bytes = 64;
   write(*file, other);
   EXPECT_EQ(contents("a"), contents("b"));
-  write(*wide_file, spec(*wide_file, "w"));
+  write(*wide_file, spec_with_head(*wide_file, "w"));
   EXPECT_EQ(contents("a"), contents("w"));
 }
 
@@ -325,6 +238,39 @@ TEST_F(Package, RefusesWrongDirectories) {
   EXPECT_THAT(check_error("p"), testing::HasSubstr("expected at most 8388608"));
 }
 
+// A page of the directory can begin in the middle of the blocks of a band of color pages.
+TEST_F(Package, ReadsColorsAfterTheFirstPageOfTheDirectory) {
+  constexpr uint64_t kBlocks = 2 * kPageBlocks, kBlockBytes = 20;
+  PackageIndex index;
+  index.manifest = R"({"levels":5,"tile_levels":2})";
+  index.bands = {{.level = 0, .items = 1, .blocks = 1},
+                 {.is_color = true, .level = 1, .items = kBlocks - 1, .blocks = kBlocks - 1}};
+  index.packs = {{"packs/0-a.bin", kBlocks * kBlockBytes, kBlocks}};
+  std::string directory;
+  for (uint64_t page = 0; page < 2; ++page) {
+    std::string lengths, low, high;
+    const uint64_t first = page * kPageBlocks;
+    for (uint64_t block = first; block < first + kPageBlocks; ++block) {
+      lengths += {static_cast<char>(kBlockBytes), 0};
+      if (block == 0) continue;
+      low += {static_cast<char>(block & 255), static_cast<char>(block >> 8), 0, 0};
+      high += std::string(4, '\0');
+    }
+    const std::string bytes = gzip_block(lengths + low + high);
+    index.pages.push_back({.bytes = bytes.size(), .offset = first * kBlockBytes, .code = first});
+    directory += bytes;
+  }
+  index.directory = {hashed_name("directory", directory, ".bin"), directory.size()};
+  fs::create_directories(path("p"));
+  write_bytes(path("p/package.json"), index_text(index));
+  write_bytes(path("p/") + index.directory.name, directory);
+  const PackageReader package(system_files(), path("p"));
+  EXPECT_EQ(error_of([&] {
+              package.color_page(1, {7, 7, 7});
+            }).code(),
+            ErrorCode::kNotFound);  // the pack
+}
+
 // Decoding a damaged block throws Error{kCorrupt} or returns the right number of tiles.
 TEST_F(Package, SurvivesDamagedBlocks) {
   const QueryFile scene(random_voxels(7, 64));
@@ -385,11 +331,11 @@ TEST_F(Package, ReplacesOnlyPackages) {
   EXPECT_EQ(error_of([&] { write(*file, spec(*file, "no/p")); }).code(), ErrorCode::kNotFound);
 
   fs::create_directories(path("p"));  // an empty folder
-  write(*file, spec(*file, "p"));
+  write(*file, spec_with_head(*file, "p"));
   write_bytes(path("p/CNAME"), "example.org");
-  write(*file2, spec(*file2, "p"));
+  write(*file2, spec_with_head(*file2, "p"));
   check("p");
-  write(*file2, spec(*file2, "q"));
+  write(*file2, spec_with_head(*file2, "q"));
   auto expected = contents("q");
   expected["CNAME"] = "example.org";
   EXPECT_EQ(contents("p"), expected);
