@@ -14,6 +14,7 @@ const kBlockTiles = 64;
 const kMaxGap = 16 * 1024;         // maximum bytes between two blocks of one request
 const kMaxRange = 1 << 20;         // maximum bytes of one request
 const kMaxCachedBytes = 32 << 20;  // limit for decompressed blocks in memory
+const kMaxTileBatches = 2, kMaxBatchTiles = 512;
 const kLookAgainMs = 5000;
 
 const kReplaced = {
@@ -53,6 +54,11 @@ export class PackageSource {
   }
   get batchMax() {
     return this.info.batch_max;
+  }
+  // Limits of TileLoader. Batches are larger than for the service, because one request can fetch
+  // the blocks of many tiles, if these blocks are close together.
+  get tileLimits() {
+    return {maxRequests: kMaxTileBatches, maxBatch: kMaxBatchTiles};
   }
 
   async manifest() {

@@ -11,9 +11,10 @@ const kMaxRootTries = 3;  // tries to load the root if the answers are unusable
 // that must be linked to the tile.
 export class TileLoader extends Loader {
   constructor(source, store, onArrival) {
+    const {tileLimits, batchMax} = source;
     super(
         source, store, onArrival,
-        {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, source.batchMax)});
+        tileLimits ?? {maxRequests: kMaxRequests, maxBatch: Math.min(kMaxBatch, batchMax)});
     this.firstView = null;  // the FirstView that receives the next tiles
   }
 
