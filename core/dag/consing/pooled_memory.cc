@@ -90,8 +90,22 @@ PagePool::Pages PooledMemory::allocate(size_t bytes, bool zero) {
   return pages;
 }
 
+bool PooledMemory::move_to_cached(PagePool::Pages& pages, size_t bytes) {
+  const PagePool::Pages cached = pool.take(bytes, 2 * bytes);
+  if (!cached.data) return false;
+  if (pool.cached_bytes() + cached.bytes > budget.available() || !budget.try_charge(cached.bytes)) {
+    free_pages(cached.data, cached.bytes);
+    return false;
+  }
+  std::memcpy(cached.data, pages.data, pages.bytes);
+  free(pages);
+  pages = cached;
+  return true;
+}
+
 void PooledMemory::grow(PagePool::Pages& pages, size_t bytes) {
   const size_t new_bytes = PagePool::range_bytes(bytes), more = new_bytes - pages.bytes;
+  if (move_to_cached(pages, new_bytes)) return;
   // Charges only the difference. With ThreadSanitizer, grow_pages() copies the pages, so for a
   // moment the old pages also exist and are not charged.
   charge(more);

@@ -64,6 +64,10 @@ class PooledMemory {
 
  private:
   void charge(size_t bytes);
+  // Moves the contents of `pages` to a cached range of `bytes` to 2 * `bytes` bytes, because new
+  // pages take longer than a copy. Returns false, with `pages` unchanged, if there is no such range
+  // or the budget has no space for both ranges.
+  bool move_to_cached(PagePool::Pages& pages, size_t bytes);
 };
 
 // An array of at least `size` elements, in cached or new pages. Throws like

@@ -82,6 +82,42 @@ TEST_F(PooledMemoryTest, ArraysGrow) {
   }
 }
 
+// Arrays grow into cached pages. So the cache does not get another range each time that an array
+// grows to the same size.
+TEST_F(PooledMemoryTest, ArraysGrowIntoCachedPages) {
+  constexpr size_t kBytes = 1 << 20;
+  const auto use = [&] {
+    PooledArray<uint8_t> array(memory_, 10);
+    while (array.size() < kBytes) {
+      const size_t filled = array.size();
+      std::fill(array.begin(), array.end(), static_cast<uint8_t>(filled >> 12));
+      array.grow(memory_, filled + 1);
+      ASSERT_EQ(budget_.used(), array.size());
+      ASSERT_EQ(array[0], static_cast<uint8_t>(filled >> 12));
+      ASSERT_EQ(array[filled - 1], static_cast<uint8_t>(filled >> 12));
+    }
+  };
+  for (int i = 0; i < 20; ++i) use();
+  EXPECT_LT(pool_.cached_bytes(), 3 * kBytes);
+  EXPECT_EQ(budget_.used(), 0u);
+}
+
+// If the budget has no space for an array's old pages together with cached ones, the array grows
+// without the cached pages.
+TEST_F(PooledMemoryTest, ArraysGrowInPlaceIfTheBudgetIsTight) {
+  PooledArray<uint8_t> array(memory_, 6 << 20);
+  array[(6 << 20) - 1] = 42;
+  { const PooledArray<uint8_t> freed(memory_, 8 << 20); }
+  ASSERT_EQ(pool_.cached_bytes(), 8u << 20);
+  ASSERT_TRUE(budget_.try_charge(52 << 20));
+  array.grow(memory_, 7 << 20);
+  EXPECT_EQ(array.size(), 8u << 20);
+  EXPECT_EQ(array[(6 << 20) - 1], 42);
+  EXPECT_EQ(pool_.cached_bytes(), 0u);
+  EXPECT_EQ(budget_.used(), 60u << 20);
+  budget_.release(52 << 20);
+}
+
 // An array that does not fit throws OutOfBudget. If an array cannot grow, it is unchanged.
 TEST_F(PooledMemoryTest, TooLargeIsOutOfBudget) {
   EXPECT_THROW(PooledArray<uint64_t>(memory_, 9 << 20), OutOfBudget);
