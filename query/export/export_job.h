@@ -160,10 +160,10 @@ uint64_t require_voxels(const ExportJob& job, uint64_t limit, const std::string&
 // Throws Error{kCorrupt} unless `written`, the number of voxels that a writer has found, equals
 // `expected`, the number of voxels in the file's header or from an earlier count.
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected);
-// Returns the name of a cell of the selection's grid, for messages.
 // Returns the end of a message about a damaged file: the command that reports the damage, if the
 // users have one.
 std::string damage_text();
+// Returns the name of a cell of the selection's grid, for messages.
 std::string cell_text(const ExportJob& job, const std::array<int64_t, 3>& cell);
 // Returns the color of a cell of the selected grid. The cell must be set and is in turned axes.
 // Throws Error{kCorrupt} if it has no color.

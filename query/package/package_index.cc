@@ -64,6 +64,7 @@ class Parser {
     index.manifest = exact_json_text(manifest);
     for (const Json& band : list(json, "bands")) index.bands.push_back(band_of(band));
     expect(index.bands.size() <= kMaxBands, "'bands'", "at most two bands of each level");
+    expect(version == kVersion || !json.contains("head"), "'head'", "no head in version 1");
     if (json.contains("head")) index.head = head_of(json["head"]);
     const Json& directory = member(json, "directory");
     index.directory = file_of(directory);

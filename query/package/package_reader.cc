@@ -382,6 +382,11 @@ void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
     expected =
         check_tiles(*placed, below == bands.end() ? 0 : below->band.head_tiles, progress, cancel);
   }
+  const bool has_tiles =
+      std::ranges::any_of(bands, [](const PlacedBand& placed) { return !placed.band.is_color; });
+  if (has_tiles && expected != 0)
+    corrupt(path_of(kIndexName), "the finest tiles refer to " + std::to_string(expected) +
+                                     " tiles of another band: expected the band with these tiles");
   progress.end_stage();
 }
 

@@ -1,6 +1,7 @@
-// Numbers the tiles of a band (package_index.h). The tiles get the numbers 0, 1, ... in the order
-// in which a walk over the tiles of the band above first reaches them. So the numbers depend only
-// on the contents of the DAG, not on the order of its nodes in the file. Not thread-safe.
+// Numbers the tiles of a band (package_index.h). The tiles of the first picture (first_tiles.h) get
+// the first numbers, and then all other tiles, both in the order in which a walk over the tiles of
+// the band above first reaches them. So the numbers depend only on the contents of the DAG and on
+// the camera of the first picture, not on the order of the nodes in the file. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -42,6 +42,9 @@ class FlatRegion {
  public:
   // Upper bound of the memory that this object allocates.
   static constexpr uint64_t kMaxBytes = uint64_t{512} << 10;
+  // Maximum length of waiting_. find() lets it grow to half of this length, and a surface adds at
+  // most RegionBaker::kTriangleCells elements, a quarter of it.
+  static constexpr size_t kMaxWaiting = size_t{1} << 16;
 
   explicit FlatRegion(const ColorGrid& grid)
       : grid_(grid), region_(grid), covered_(kWords), touched_(kWords) {
@@ -113,10 +116,6 @@ class FlatRegion {
   void remove_covered() {
     std::erase_if(waiting_, [&](uint32_t code) { return is_covered(code); });
   }
-
-  // Maximum length of waiting_. find() lets it grow to half of this length, and a surface adds at
-  // most RegionBaker::kTriangleCells elements, a quarter of it.
-  static constexpr size_t kMaxWaiting = size_t{1} << 16;
 
   const ColorGrid grid_;
   color::RegionBox region_;

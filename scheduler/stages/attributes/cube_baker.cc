@@ -31,6 +31,8 @@ constexpr uint64_t kFixedBytes = uint64_t{6} << 20;
 uint32_t max_cells_of(uint64_t region_bytes) {
   constexpr uint32_t kTriangleCells = RegionBaker<TextureReader>::kTriangleCells;
   static_assert(ColorMemory::kRegionBytes > kFixedBytes + 2 * kTriangleCells * kCellBytes);
+  static_assert(FlatRegion::kMaxBytes < kFixedBytes / 2);
+  static_assert(kTriangleCells <= FlatRegion::kMaxWaiting / 4);
   static_assert(ColorMemory::kSolidRegionBytes >
                 kFixedBytes + (color::RegionCells::kMaxCells + kTriangleCells) * kCellBytes);
   return static_cast<uint32_t>(std::min<uint64_t>(

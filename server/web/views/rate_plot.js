@@ -34,6 +34,7 @@ export class RatePlot {
     const isDue = job.state !== "running" || performance.now() >= this.nextFetchMs;
     if (!p || key === this.key || !isDue || this.fetching) return;
     this.fetching = true;
+    const {attempts, state} = job;
     try {
       this.stages = (await getJson(this.path, this.signal)).stages;
       this.key = key;
@@ -45,6 +46,9 @@ export class RatePlot {
     }
     this.draw();
     onChange();
+    // The last rates of an attempt can be stored while the request is in flight.
+    if (this.job.attempts !== attempts || this.job.state !== state)
+      await this.update(this.job, onChange);
   }
 
   // Returns the points of each stage by its name. The present rate of a running job is the last

@@ -192,14 +192,13 @@ export class PackageSource {
     for (const each of group) {
       const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
       const decode = (bytes) => this.decode(each.block, part(bytes), bytes.isRange);
-      each.resolve(reads.then(decode).catch((error) => {
+      each.resolve(reads.then((bytes) => decode(bytes).catch((error) => {
         // If no answer to a range request was correct so far, the server possibly sends wrong
         // ranges. In this case, fetches the complete file.
-        if (error.status !== 200 || this.files.rangesAreProven || !this.files.hasRanges)
-          throw error;
+        if (!bytes.isRange || this.files.rangesAreProven || !this.files.hasRanges) throw error;
         this.files.hasRanges = false;
         return read().then(decode);
-      }));
+      })));
     }
   }
 

@@ -10,13 +10,11 @@ function start() {
   return embedded ? startEmbedded(embedded) : startFile();
 }
 
-// The page cannot decompress the blocks of the package without DecompressionStream either. The
-// plain module then shows a message.
 async function startFile() {
+  if (!window.DecompressionStream) return showTooOld();
   const names = document.querySelector("meta[name=voxdag-viewer]").content.split(" ");
   const [compressed, plain] = names.map((name) => new URL(name, location.href).href);
-  const canDecompress = Boolean(window.DecompressionStream) && await permitsBlobs();
-  const module = canDecompress ? await compressedModule(compressed) : null;
+  const module = await permitsBlobs() ? await compressedModule(compressed) : null;
   await import(module === null ? plain : blobUrl(module));
 }
 

@@ -52,6 +52,43 @@ TEST_F(PackageHead, IsSmallIfTheSceneIsFarAway) {
     EXPECT_LE(count(distance), kMaxFirstTiles) << distance;
 }
 
+// An index without the band of the finest tiles is damaged, although all blocks that it names are
+// intact.
+TEST_F(PackageHead, NamesAMissingBand) {
+  const QueryFile scene(random_voxels(5, 64));
+  const auto file = open_global_file(scene.path());
+  // The first picture of "far" needs only the root. The head of "near" has all tiles, so its
+  // directory is empty.
+  PackageSpec far = spec_with_head(*file, "far");
+  far.camera = Placement{{{32, 32, 10000}}, {{32, 32, 32}}, 35};
+  write(*file, far);
+  write(*file, spec_with_head(*file, "near"));
+  const std::string index_path = path("far") + "/" + kIndexName;
+  auto index = nlohmann::ordered_json::parse(read_bytes(index_path));
+  const auto near = nlohmann::ordered_json::parse(read_bytes(path("near") + "/" + kIndexName));
+  ASSERT_TRUE(near["packs"].empty());
+  ASSERT_EQ(index["bands"].size(), 2u);
+  index["bands"].erase(1);
+  index["packs"] = near["packs"];
+  index["directory"] = near["directory"];
+  const std::string directory = "/" + near["directory"]["name"].get<std::string>();
+  fs::copy_file(path("near") + directory, path("far") + directory);
+  write_bytes(index_path, index.dump());
+  EXPECT_THAT(check_error("far"), testing::HasSubstr("the finest tiles refer to"));
+}
+
+// Version 1 has no heads.
+TEST_F(PackageHead, IsRefusedInVersion1) {
+  const QueryFile scene(random_voxels(5, 64));
+  const auto file = open_global_file(scene.path());
+  write(*file, spec_with_head(*file, "p"));
+  const std::string index_path = path("p") + "/" + kIndexName;
+  auto index = nlohmann::ordered_json::parse(read_bytes(index_path));
+  index["version"] = 1;
+  write_bytes(index_path, index.dump());
+  EXPECT_THAT(check_error("p"), testing::HasSubstr("no head in version 1"));
+}
+
 TEST_F(PackageHead, NamesDamage) {
   const QueryFile scene(random_voxels(5, 256));
   const auto file = open_global_file(scene.path());
