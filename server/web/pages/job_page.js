@@ -38,6 +38,7 @@ class JobPage {
     this.path = `/api/v1/jobs/${id}`;
     this.signal = signal;
     this.job = null;
+    this.jobEvents = 0;  // number of events "job" received
     this.places = Object.fromEntries(["head", "actions", "error", "warnings", "result"].map(
         (name) => [name, h("div", {class: name})]));
     this.places.error.setAttribute("role", "alert");
@@ -92,7 +93,10 @@ class JobPage {
   }
 
   handleEvent(name, data) {
-    if (name === "job") this.updateJob(data);
+    if (name === "job") {
+      ++this.jobEvents;
+      this.updateJob(data);
+    }
     if (name === "progress") this.updateProgress(data);
   }
 
@@ -151,7 +155,9 @@ class JobPage {
   }
 
   async reload() {
-    this.updateJob(await getJson(this.path, this.signal));
+    const events = this.jobEvents, job = await getJson(this.path, this.signal);
+    // An event that has arrived since the request can have a newer state than the answer.
+    if (this.jobEvents === events) this.updateJob(job);
     this.wake?.();
   }
 
