@@ -22,11 +22,10 @@ std::string shown(const FieldJson& json) {
          return item.is_structured() || item.is_string();
        })))
     return "an array of " + std::to_string(json.size()) + " items";
-  const auto text_of = [](const FieldJson& value) { return ascii_json_text(value); };
-  if (!json.is_string()) return text_of(json);
+  if (!json.is_string()) return ascii_json_text(json);
   const auto& text = json.get_ref<const std::string&>();
-  return text.size() <= kMaxShownBytes ? text_of(json)
-                                       : text_of(text.substr(0, kMaxShownBytes)) + "...";
+  if (text.size() <= kMaxShownBytes) return ascii_json_text(json);
+  return ascii_json_text(FieldJson(text.substr(0, kMaxShownBytes))) + "...";
 }
 
 }  // namespace

@@ -180,8 +180,8 @@ class BandWriter {
   const CancelToken& cancel_;
   ColorBands colors_;
   FirstTiles first_;  // the tiles of the first picture
-  uint64_t head_tiles_ =
-      0;  // number of these tiles in the current band; they have the first numbers
+  // Number of these tiles in the current band. They have its first numbers.
+  uint64_t head_tiles_ = 0;
   uint64_t tiles_ = 0;
 };
 

@@ -96,7 +96,8 @@ TEST_P(Coplanar, ShellEqualsTheOracle) {
 
 TEST_P(Coplanar, ThinEqualsTheOracle) {
   const auto backend = open();
-  if (!traits_of(VoxelRule::kThin).is_parallel && backend->name() != "cpu") GTEST_SKIP();
+  if (!traits_of(VoxelRule::kThin).is_parallel && backend->name() != "cpu")
+    GTEST_SKIP() << GetParam().name << " does not have the rule";
   for_each_scene([&](const oracle::Triangles& scene) {
     const Built built =
         build(*backend, {kPlaneGridLevels, Cube{}, 64, nullptr, VoxelRule::kThin}, scene);

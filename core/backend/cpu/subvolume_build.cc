@@ -126,6 +126,7 @@ SubvolumeBuild::SolidNode SubvolumeBuild::build_solid(int size_log2, const Latti
   if (count == 0) return {{}, true};
   if (size_log2 == kTileLog2) {
     SolidNode node;
+    // Does not use covering(), because the crossings of other triangles would also count.
     if (count == 1 && entries_[first].inside() && build_solid_plane(cube, entries_[first], node))
       return node;
     return build_solid_tile(cube, first, count);

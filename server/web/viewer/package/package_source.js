@@ -62,10 +62,6 @@ export class PackageSource {
   }
 
   async manifest() {
-    if (!window.DecompressionStream)
-      throw new Error(
-          "This browser is too old: the viewer needs DecompressionStream, which browsers have " +
-          "since 2023.");
     const index = await this.fetchIndex();
     checkManifest(index.manifest);
     this.info = index.manifest;

@@ -6,12 +6,13 @@ const kTooOld =
     "This browser is too old: the viewer needs DecompressionStream, which browsers have since 2023.";
 
 function start() {
+  // Without DecompressionStream, the page could decompress neither the module nor the package.
+  if (!window.DecompressionStream) return showTooOld();
   const embedded = document.querySelector("script[data-module]");
   return embedded ? startEmbedded(embedded) : startFile();
 }
 
 async function startFile() {
-  if (!window.DecompressionStream) return showTooOld();
   const names = document.querySelector("meta[name=voxdag-viewer]").content.split(" ");
   const [compressed, plain] = names.map((name) => new URL(name, location.href).href);
   const module = await permitsBlobs() ? await compressedModule(compressed) : null;
@@ -50,7 +51,6 @@ function decompressed(stream) {
 // Runs the module as an element of the page, because browsers restrict the blob: URLs of pages that
 // are local files.
 async function startEmbedded(embedded) {
-  if (!window.DecompressionStream) return showTooOld();
   const bytes = Uint8Array.from(atob(embedded.textContent), (each) => each.charCodeAt(0));
   embedded.remove();  // frees the memory of the text
   const script = document.createElement("script");

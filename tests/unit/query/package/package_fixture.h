@@ -51,6 +51,12 @@ class Package : public testing::Test {
     const auto file = open_global_file(scene.path());
     write(*file, spec(*file, output));
   }
+  nlohmann::ordered_json read_index(const std::string& output) const {
+    return nlohmann::ordered_json::parse(read_bytes(path(output) + "/" + kIndexName));
+  }
+  void write_index(const std::string& output, const nlohmann::ordered_json& index) const {
+    write_bytes(path(output) + "/" + kIndexName, index.dump());
+  }
   void check(const std::string& output) {
     PackageReader(system_files(), path(output)).check(progress_, never_);
   }

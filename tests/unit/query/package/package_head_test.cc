@@ -63,9 +63,8 @@ TEST_F(PackageHead, NamesAMissingBand) {
   far.camera = Placement{{{32, 32, 10000}}, {{32, 32, 32}}, 35};
   write(*file, far);
   write(*file, spec_with_head(*file, "near"));
-  const std::string index_path = path("far") + "/" + kIndexName;
-  auto index = nlohmann::ordered_json::parse(read_bytes(index_path));
-  const auto near = nlohmann::ordered_json::parse(read_bytes(path("near") + "/" + kIndexName));
+  auto index = read_index("far");
+  const auto near = read_index("near");
   ASSERT_TRUE(near["packs"].empty());
   ASSERT_EQ(index["bands"].size(), 2u);
   index["bands"].erase(1);
@@ -73,7 +72,7 @@ TEST_F(PackageHead, NamesAMissingBand) {
   index["directory"] = near["directory"];
   const std::string directory = "/" + near["directory"]["name"].get<std::string>();
   fs::copy_file(path("near") + directory, path("far") + directory);
-  write_bytes(index_path, index.dump());
+  write_index("far", index);
   EXPECT_THAT(check_error("far"), testing::HasSubstr("the finest tiles refer to"));
 }
 
@@ -82,10 +81,9 @@ TEST_F(PackageHead, IsRefusedInVersion1) {
   const QueryFile scene(random_voxels(5, 64));
   const auto file = open_global_file(scene.path());
   write(*file, spec_with_head(*file, "p"));
-  const std::string index_path = path("p") + "/" + kIndexName;
-  auto index = nlohmann::ordered_json::parse(read_bytes(index_path));
+  auto index = read_index("p");
   index["version"] = 1;
-  write_bytes(index_path, index.dump());
+  write_index("p", index);
   EXPECT_THAT(check_error("p"), testing::HasSubstr("no head in version 1"));
 }
 
