@@ -14,9 +14,11 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
+#include "core/io/overwrite.h"
 #include "query/combine/combine.h"
 #include "query/dag/locked_outputs.h"
 #include "query/dag/temporary_work.h"
+#include "scene/formats/formats.h"
 #include "scheduler/run_build.h"
 
 namespace voxdag::cli {
@@ -34,27 +36,61 @@ struct EditCommand {
 // 0,0,0 is placed.
 struct Part {
   explicit Part(const std::string& text) {
-    const size_t at = std::min(text.rfind('@'), text.size());
+    const size_t at = text.rfind('@');
+    const auto numbers = at == std::string::npos || at == 0
+                             ? std::nullopt
+                             : parse_numbers<int64_t, 3>(text.substr(at + 1), ',');
+    if (!numbers)
+      throw Error(
+          ErrorCode::kInvalidInput,
+          "--paste '" + text + "': expected a .vdag file and three whole numbers, PART.vdag@X,Y,Z");
     path = text.substr(0, at);
-    offset = parse_list<int64_t, 3>("--paste", text.substr(std::min(at + 1, text.size())), ',',
-                                    "a .vdag file and three whole numbers, PART.vdag@X,Y,Z");
+    offset = *numbers;
   }
   std::string path;
   std::array<int64_t, 3> offset = {};
 };
 
+// Returns the files that the scenes of --add name, such as buffers and images. Opens the scenes,
+// but only if the output would replace a file: otherwise, no input can be in danger.
+std::vector<std::string> files_of_scenes(const EditCommand& command, CommandContext& context) {
+  const auto is_present = [&](const std::string& path) {
+    const auto file = open_if_there(context.files, path);
+    return file && file->size() > 0;
+  };
+  std::vector<std::string> paths;
+  if (command.scenes.empty() || !command.force) return paths;
+  if (!is_present(command.output) && !is_present(command.output + ".partial")) return paths;
+  MemoryBudget budget(memory_limit(command.memory));
+  const auto scene = open_scene(context.files, command.scenes, {}, budget, context.cancel);
+  for (const SourceFile& file : scene->files()) paths.push_back(file.path);
+  for (const ImageSource& image : scene->materials().images) paths.push_back(image.file.path);
+  return paths;
+}
+
+// Returns the files that the command reads. The output must not be one of them.
+std::vector<std::string> inputs_of(const EditCommand& command, const std::vector<Part>& parts,
+                                   CommandContext& context) {
+  std::vector<std::string> inputs = files_of_scenes(command, context);
+  inputs.push_back(command.input);
+  inputs.insert(inputs.end(), command.scenes.begin(), command.scenes.end());
+  for (const Part& part : parts) inputs.push_back(part.path);
+  return inputs;
+}
+
 // Applies the edits in turn: first all cuts, then the scenes of --add, then all pasted files. Each
 // edit writes a new file to a temporary folder, and the next edit reads it.
 class Edit {
  public:
-  Edit(const EditCommand& command, CommandContext& context, FileSystem& files)
+  Edit(const EditCommand& command, const std::vector<Part>& parts, CommandContext& context,
+       FileSystem& files)
       : command_(command),
         context_(context),
         files_(files),
         progress_(make_progress_bar(command.quiet)),
         folder_(files, command.output + ".work-"),
         shapes_(command.cuts.begin(), command.cuts.end()),
-        parts_(command.parts.begin(), command.parts.end()),
+        parts_(parts),
         current_(command.input) {
     spec_.first_name = command.input;
     spec_.replace = true;
@@ -160,7 +196,7 @@ class Edit {
   const std::unique_ptr<Progress> progress_;
   const query::TemporaryWork folder_;
   const std::vector<query::Shape> shapes_;
-  const std::vector<Part> parts_;
+  const std::vector<Part>& parts_;
   query::CombineSpec spec_;
   std::string current_;  // the file that the next edit reads
   size_t steps_left_ = 0;
@@ -170,9 +206,11 @@ class Edit {
 void run(const EditCommand& command, CommandContext& context) {
   if (command.cuts.empty() && command.scenes.empty() && command.parts.empty())
     throw Error(ErrorCode::kInvalidInput, "no edit was given: expected --cut, --add or --paste");
-  query::LockedOutputs outputs(context.files, {{command.output}, {command.input}, command.force});
+  const std::vector<Part> parts(command.parts.begin(), command.parts.end());
+  query::LockedOutputs outputs(
+      context.files, {{command.output}, inputs_of(command, parts, context), command.force});
   const RunTimer timer;
-  const query::CombineReport report = Edit(command, context, outputs.files()).run();
+  const query::CombineReport report = Edit(command, parts, context, outputs.files()).run();
   const RunTimes times = timer.elapsed();
   if (!command.json) return print_combined(command.output, report, times);
   print_json(combined_json(command.output, report, times));

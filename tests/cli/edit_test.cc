@@ -148,7 +148,9 @@ TEST_F(Edit, RefusesBadArguments) {
   expect_error(2, "no edit was given: expected --cut, --add or --paste",
                {"edit", "a.vdag", "-o", "x.vdag"});
   expect_error(2, "shape 'cone:1'", {"edit", "a.vdag", "--cut", "cone:1", "-o", "x.vdag"});
-  expect_error(2, "PART.vdag@X,Y,Z", {"edit", "a.vdag", "--paste", "a.vdag", "-o", "x.vdag"});
+  for (const std::string part : {"a.vdag", "a.vdag@", "a.vdag@1,2", "@1,2,3"})
+    expect_error(2, "--paste '" + part + "': expected a .vdag file and three whole numbers",
+                 {"edit", "a.vdag", "--paste", part, "-o", "x.vdag"});
   expect_error(3, "none.glb", {"edit", "a.vdag", "--add", "none.glb", "-o", "x.vdag"});
   expect_error(2, "a.vdag",
                {"edit", "a.vdag", "--cut", "sphere:0,0,0,5", "-o", "a.vdag", "--force"});
@@ -162,6 +164,28 @@ TEST_F(Edit, RefusesBadArguments) {
                {"edit", "a.vdag", "--paste", "colored.vdag@0,0,0", "--fill-color", "#ff000", "-o",
                 "x.vdag"});
   EXPECT_FALSE(exists("x.vdag") || exists("x.vdag.partial") || exists("x.vdag.lock"));
+}
+
+// The output must not be a pasted file, an added scene or a file that an added scene names, also not
+// with --force.
+TEST_F(Edit, KeepsItsInputs) {
+  const auto expect_kept = [&](const std::string& name, const std::string& option,
+                               const std::string& value) {
+    const std::string before = contents(name);
+    expect_error(2, name + " is an input and would be overwritten",
+                 {"edit", "a.vdag", option, value, "-o", name, "--force"});
+    EXPECT_TRUE(contents(name) == before) << name;
+  };
+  build({"b.glb"}, "part.vdag");
+  put("scene.obj", "mtllib scene.mtl\nusemtl m\nv 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n");
+  put("scene.mtl", "newmtl m\nKd 1 0 0\nmap_Kd image.png\n");
+  put("image.png", "not an image");
+  expect_kept("part.vdag", "--paste", "part.vdag@0,0,0");
+  expect_kept("scene.obj", "--add", "scene.obj");
+  expect_kept("scene.mtl", "--add", "scene.obj");
+  expect_kept("image.png", "--add", "scene.obj");
+  put("other.vdag", "");
+  run_json({"edit", "a.vdag", "--add", "scene.obj", "-o", "other.vdag"});
 }
 
 }  // namespace
