@@ -167,6 +167,20 @@ Option Command::text_option(const char* names, const char* value_name,
                     ->type_name(value_name));
 }
 
+Option Command::edge_option(const char* name, std::function<void(uint64_t)> set,
+                            const std::string& description) {
+  return text_option(
+      name, "N",
+      [name = std::string(name), set = std::move(set)](const std::string& text) {
+        const auto edge = edge_of_text(text);
+        if (!edge)
+          throw Error(ErrorCode::kInvalidInput,
+                      name + ": '" + text + "': expected a number of voxels such as 4096 or 4k");
+        set(*edge);
+      },
+      description);
+}
+
 Option Command::flag(const char* names, bool& value, const char* description) {
   return Option(app_->add_flag(names, value, description));
 }

@@ -80,6 +80,9 @@ class Command {
   Option text_option(const char* names, const char* value_name,
                      std::function<void(const std::string& text)> set,
                      const std::string& description);
+  // Adds an option for a number of voxels per edge, such as 4096 or 4k. `set` receives the number.
+  Option edge_option(const char* name, std::function<void(uint64_t edge)> set,
+                     const std::string& description);
   Option flag(const char* names, bool& value, const char* description);
   // Adds an option for the name of a file to write.
   Option output_option(const char* names, std::string& path, const char* description);

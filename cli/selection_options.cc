@@ -4,7 +4,6 @@
 
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
-#include "core/fields/field.h"
 
 namespace voxdag::cli {
 namespace {
@@ -70,15 +69,8 @@ void SelectionOptions::declare(Command& command) {
   world_flag.needs(region_option);
   Option level_option =
       command.option("--level", level, "l: the coarser grid of 2^l voxels per edge");
-  const Option resolution_option = command.text_option(
-      "--resolution", "N",
-      [this](const std::string& text) {
-        resolution = edge_of_text(text);
-        if (!resolution)
-          throw Error(
-              ErrorCode::kInvalidInput,
-              "--resolution: '" + text + "': expected a number of voxels such as 4096 or 4k");
-      },
+  const Option resolution_option = command.edge_option(
+      "--resolution", [this](uint64_t edge) { resolution = edge; },
       "the same by its voxels per edge, such as 4096 or 4k");
   level_option.excludes(resolution_option);
 }

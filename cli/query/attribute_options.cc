@@ -23,9 +23,10 @@ void AttributeOptions::declare(Command& command) {
   command.text_option(
       "--fill-color", "RRGGBB", [this](const std::string& text) { fill_color = parse_color(text); },
       "if only one file has colors: the color of the cells in which this file has no voxel");
-  command.option("--color-resolution", color_resolution,
-                 "maximum number of color cells per edge of the grid, a power of two; default: the "
-                 "finest color cells of the files");
+  command.edge_option(
+      "--color-resolution", [this](uint64_t edge) { color_resolution = edge; },
+      "maximum number of color cells per edge of the grid, a power of two such as 1024 or 1k; "
+      "default: the finest color cells of the files");
   command.flag("--no-attributes", no_attributes,
                "write only the voxels, without colors and other attributes");
 }

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/option_fields.h"
 #include "cli/output.h"
@@ -21,7 +22,8 @@ struct ExportCommand {
   std::string input, format, output, memory;
   SelectionOptions selection;
   query::ExportOptions options;
-  uint64_t chunks = 0, levels = 1;
+  std::optional<uint64_t> chunks;
+  uint64_t levels = 1;
   bool gray = false, force = false, quiet = false, json = false;
 };
 
@@ -78,10 +80,10 @@ void run(const ExportCommand& command, CommandContext& context) {
   const auto file = open_global_file(command.input);
   request.selection = command.selection.selection(*file);
   const double start_s = wall_seconds();
-  if (command.chunks > 0)
+  if (command.chunks)
     return print_chunks(
         command,
-        query::export_chunks(context.files, *file, {request, command.chunks, command.levels},
+        query::export_chunks(context.files, *file, {request, *command.chunks, command.levels},
                              *progress, context.cancel),
         wall_seconds() - start_s);
   const query::ExportReport report =
@@ -115,12 +117,10 @@ void declare(Command& command, ExportCommand& state) {
   command.flag("--gray", state.gray, "leave out the colors that the file may have");
   OptionDeclarer declarer(command, Scope::kSubmit);
   fields(declarer, state.options);
-  const Option chunks_option =
-      command
-          .option("--chunks", state.chunks,
-                  "N: write a file for each cube of N voxels per edge that has voxels, into the "
-                  "folder -o, and manifest.json")
-          .positive();
+  const Option chunks_option = command.edge_option(
+      "--chunks", [&state](uint64_t edge) { state.chunks = edge; },
+      "N: write a file for each cube of N voxels per edge that has voxels, into the folder -o, and "
+      "manifest.json");
   command
       .option("--levels", state.levels,
               "with --chunks: also write the chunks of coarser levels, together this number "

@@ -163,11 +163,21 @@ TEST_F(Edit, RefusesBadArguments) {
   expect_error(2, "six hexadecimal digits",
                {"edit", "a.vdag", "--paste", "colored.vdag@0,0,0", "--fill-color", "#ff000", "-o",
                 "x.vdag"});
+  const auto expect_wrong_cells = [&](const std::string& cells, const std::string& expected) {
+    expect_error(2, expected,
+                 {"combine", "colored.vdag", "--union", "colored.vdag", "--color-resolution", cells,
+                  "-o", "x.vdag"});
+  };
+  expect_wrong_cells("1k", "--color-resolution 1024: expected a power of two from 4 to 128");
+  expect_wrong_cells("1x", "--color-resolution: '1x': expected a number of voxels such as 4096");
+  expect_error(2, "--chunks 0: expected a power of two",
+               {"export", "a.vdag", "--to", "ply", "-o", "x", "--chunks", "0"});
+  EXPECT_EQ(run({"export", "a.vdag", "--to", "ply", "-o", "chunks", "--chunks", "1k"}).status, 0);
   EXPECT_FALSE(exists("x.vdag") || exists("x.vdag.partial") || exists("x.vdag.lock"));
 }
 
-// The output must not be a pasted file, an added scene or a file that an added scene names, also not
-// with --force.
+// The output must not be a pasted file, an added scene or a file that an added scene names, also
+// not with --force.
 TEST_F(Edit, KeepsItsInputs) {
   const auto expect_kept = [&](const std::string& name, const std::string& option,
                                const std::string& value) {
