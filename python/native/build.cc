@@ -15,6 +15,7 @@
 #include "python/native/path_text.h"
 #include "scene/mesh_files.h"
 #include "scheduler/plan_build.h"
+#include "scheduler/replaced_result.h"
 #include "scheduler/run_build.h"
 #include "scheduler/spec/build_fields.h"
 
@@ -167,6 +168,7 @@ std::string build(std::vector<PathText> files, std::vector<FileBytes> bytes,
                         {std::move(files), std::move(bytes), std::move(meshes)},
                         std::move(progress),
                         [](const BuildSpec& spec, const BuildContext& context) {
+                          refuse_result_of_other_scene(context.files, spec);
                           return report_json(run_build(spec, context));
                         });
 }

@@ -3,6 +3,7 @@
 import hashlib
 import os
 import resource
+import shutil
 import signal
 
 import numpy as np
@@ -119,6 +120,24 @@ def test_paths_of_bytes(tmp_path, mesh):
         assert dag.path == os.fsdecode(output)
     with pytest.raises(voxdag.Error, match=r"nowhere\.glb"):
         voxdag.build([b"nowhere.glb", b"there.glb"], resolution=64, output=output, force=True)
+
+
+def test_keeps_results_of_other_scenes(tmp_path, mesh, path):
+    """As on the command line, only force=True replaces a file that is not an earlier result of the
+    same scene."""
+    output = tmp_path / "x.vdag"
+    shutil.copy(path, output)
+    before = output.read_bytes()
+    with pytest.raises(voxdag.Error, match="no report shows that mesh in memory is its scene"):
+        voxdag.build(mesh, resolution=32, output=output)
+    with pytest.raises(voxdag.Error, match="force replaces it"):
+        voxdag.from_voxels([(1, 2, 3)], output=output)
+    assert output.read_bytes() == before
+    voxdag.build(mesh, resolution=32, output=output, force=True)
+    voxdag.build(mesh, resolution=64, output=output)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(voxdag.Error, match="is the result of another scene, mesh in memory"):
+        voxdag.build(tmp_path / "a.obj", resolution=32, output=output)
 
 
 def test_a_mesh_needs_no_file(tmp_path, mesh):

@@ -107,7 +107,7 @@ def test_equality(dag, path, tmp_path):
     with voxdag.open(tmp_path / "copy.vdag") as same:
         assert same == dag and same != dag.path
         saved = pickle.dumps(same)
-    other = voxdag.from_voxels([(1, 2, 3)], output=tmp_path / "copy.vdag")
+    other = voxdag.from_voxels([(1, 2, 3)], output=tmp_path / "copy.vdag", force=True)
     assert other != dag
     with pytest.raises(voxdag.Error, match="changed since the Dag was pickled"):
         pickle.loads(saved)

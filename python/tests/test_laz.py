@@ -30,10 +30,9 @@ def folder(tmp_path_factory):
 
 
 def test_same_bytes_as_las(folder, tmp_path):
+    options = {"resolution": 256, "color": True, "force": True}
     digests = {
-        voxdag.build(folder / name, resolution=256, output=tmp_path / "a.vdag", color=True)[
-            "sha256"
-        ]
+        voxdag.build(folder / name, output=tmp_path / "a.vdag", **options)["sha256"]
         for name in ("a.las", "a.laz")
     }
     assert len(digests) == 1
@@ -46,7 +45,7 @@ def test_same_bytes_as_las(folder, tmp_path):
 def test_chunks_and_several_files(folder, tmp_path, monkeypatch):
     monkeypatch.setattr("voxdag._laz._CHUNK_POINTS", 777)
     reports = [
-        voxdag.build(scene, resolution=64, output=tmp_path / "a.vdag")
+        voxdag.build(scene, resolution=64, output=tmp_path / "a.vdag", force=True)
         for scene in ([folder / "a.laz", folder / "a.las"], [folder / "a.las", folder / "a.laz"])
     ]
     assert [report["triangles"] for report in reports] == [2 * COUNT] * 2

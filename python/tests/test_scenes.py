@@ -21,7 +21,8 @@ def colors_of(tmp_path):
 
     def colors(scene, places=((0.5, 0.5, 0), (4.5, 0.5, 1))):
         output = tmp_path / "colored.vdag"
-        voxdag.build(scene, resolution=64, output=output, color=True, bounds=(-1, -1, -1, 16))
+        bounds = (-1, -1, -1, 16)
+        voxdag.build(scene, resolution=64, output=output, color=True, bounds=bounds, force=True)
         with voxdag.open(output) as dag:
             assert dag.lookup(places, world=True).all()
             return [tuple(color) for color in dag.colors(places, world=True).tolist()]
@@ -30,7 +31,8 @@ def colors_of(tmp_path):
 
 
 def digest(scene, tmp_path, **options):
-    return voxdag.build(scene, resolution=64, output=tmp_path / "digest.vdag", **options)["sha256"]
+    output = tmp_path / "digest.vdag"
+    return voxdag.build(scene, resolution=64, output=output, force=True, **options)["sha256"]
 
 
 def test_colors_of_vertices_and_faces(colors_of):
