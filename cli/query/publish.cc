@@ -89,6 +89,10 @@ nlohmann::ordered_json report_json(const PublishCommand& command, const query::P
 }
 
 void check(const PublishCommand& command, CommandContext& context) {
+  if (!command.input.empty() || !command.output.empty())
+    throw Error(ErrorCode::kInvalidInput,
+                "--check " + command.check +
+                    ": expected no .vdag file and no --output, because --check writes nothing");
   const auto progress = make_progress_bar(command.quiet);
   const query::PackageReader reader(context.files, command.check);
   reader.check(*progress, context.cancel);

@@ -50,7 +50,8 @@ void refuse_other_folder(FileSystem& files, const std::string& path) {
                 path + ": the folder " + parent + " does not exist: expected an existing folder");
   if (!files.exists(path)) return;
   const std::string advice = ": expected a new folder, an empty one or an earlier package";
-  if (!is_folder(files, path)) throw Error(ErrorCode::kInvalidInput, path + " is a file" + advice);
+  if (!is_folder(files, path))
+    throw Error(ErrorCode::kInvalidInput, path + " is a file or a link" + advice);
   if (files.list(path).empty()) return;
   try {
     index_of_folder(files, path);

@@ -20,8 +20,9 @@
 namespace voxdag::query {
 namespace {
 
-constexpr size_t kPartBytes = size_t{1} << 20;      // files are hashed in parts of this size
-constexpr size_t kMaxBlockBytes = size_t{1} << 20;  // size of a decompressed block
+constexpr size_t kPartBytes = size_t{1} << 20;             // files are hashed in parts of this size
+constexpr uint64_t kMaxPageHtmlBytes = uint64_t{1} << 24;  // size of index.html
+constexpr size_t kMaxBlockBytes = size_t{1} << 20;         // size of a decompressed block
 constexpr size_t kDirectoryEntryBytes = 2, kCodeBytes = 8;
 // Minimum size of a compressed block: header, trailer, and the data of an empty gzip stream.
 constexpr uint64_t kMinBlockBytes = 20;
@@ -358,11 +359,23 @@ void PackageReader::check_colors(const PlacedBand& band, Progress& progress,
                                      std::to_string(band.band.items));
 }
 
+// Checks that index.html names the viewer's files. Does not expect the poster, because a user who
+// changes the page can remove it.
+void PackageReader::check_page() const {
+  const std::string path = path_of("index.html");
+  const std::string page = read_small_file(files_, path, kMaxPageHtmlBytes);
+  for (const PackageFile& file : index_.viewer)
+    if (!file.name.starts_with("poster-") && page.find(file.name) == std::string::npos)
+      corrupt(path, "it does not name the file " + file.name +
+                        " of the viewer: expected the page that was published with this package");
+}
+
 void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
   progress.begin_stage("check", blocks_ + index_.head.lengths.size(), "blocks");
   check_file(index_.directory, cancel);
   if (!index_.head.name.empty()) check_file({index_.head.name, index_.head.bytes, 0}, cancel);
   for (const PackageFile& file : index_.viewer) check_file(file, cancel);
+  if (!index_.viewer.empty()) check_page();
   for (const PackageFile& pack : index_.packs) check_file(pack, cancel);
   const std::vector<PlacedBand> bands = placed_bands();
   uint64_t expected = 1;

@@ -35,9 +35,11 @@ class PackageReader {
   // set.
   std::vector<uint32_t> color_page(uint32_t level, const std::array<uint64_t, 3>& position) const;
 
-  // Checks the sizes and hashes of all files of the package, and the contents of all blocks. Also
-  // checks the bands (the tiles whose roots are on one level): each band must have exactly the
-  // tiles to which the band above refers. Throws the Error of the first problem.
+  // Checks the sizes and hashes of all files of the package, and the contents of all blocks. The
+  // name of index.html has no hash, and the user may change the page. So this file only must exist
+  // and name the viewer's files. Also checks the bands (the tiles whose roots are on one level):
+  // each band must have exactly the tiles to which the band above refers. Throws the Error of the
+  // first problem.
   void check(Progress& progress, const CancelToken& cancel) const;
 
  private:
@@ -73,6 +75,7 @@ class PackageReader {
   std::string path_of(const Place& place) const;
   std::string name_of(const PlacedBand& band, uint64_t i) const;
   void check_file(const PackageFile& file, const CancelToken& cancel) const;
+  void check_page() const;
   uint64_t check_tiles(const PlacedBand& band, uint64_t head_tiles_below, Progress& progress,
                        const CancelToken& cancel) const;
   void check_colors(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;

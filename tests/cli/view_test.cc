@@ -71,9 +71,18 @@ TEST_F(View, IsPublished) {
   for (const char* member : {"packs", "tiles", "color_pages"})
     EXPECT_EQ(checked[member], report[member]) << member;
   EXPECT_NE(run({"publish", "--check", "p/"}).out.find("intact"), std::string::npos);
+  expect_error(2, "--check p: expected no .vdag file and no --output",
+               {"publish", "m.vdag", "--check", "p"});
+  expect_error(2, "--check p: expected no .vdag file and no --output",
+               {"publish", "m.vdag", "-o", "q", "--check", "p"});
+  const std::string page = contents("p/index.html");
+  put("p/index.html", page.substr(0, page.size() / 50));
+  expect_error(4, "p/index.html: it does not name the file start-", {"publish", "--check", "p"});
+  std::filesystem::remove(folder_.file("p/index.html"));
+  expect_error(3, "open p/index.html", {"publish", "--check", "p"});
   run_json({"publish", "m.vdag", "-o", "p/", "--gray", "--pack-size", "1MiB", "--no-poster"});
   EXPECT_EQ(contents("p/index.html").find("poster-"), std::string::npos);
-  expect_error(2, "m.vdag is a file: expected a new folder",
+  expect_error(2, "m.vdag is a file or a link: expected a new folder",
                {"publish", "m.vdag", "-o", "m.vdag", "--no-poster"});
   expect_error(2, "--pack-size 1KiB: expected 256KiB to 1GiB",
                {"publish", "m.vdag", "-o", "q", "--pack-size", "1KiB"});
