@@ -109,6 +109,32 @@ void check_arguments(const CLI::App& app) {
                                             suggestion(name, long_options(command)));
 }
 
+// Returns a validator that accepts the same values as `validator`. Its message has the form of the
+// other messages: the value, and the expected values.
+CLI::Validator expecting(const std::string& expected, const CLI::Validator& validator) {
+  return {[expected, validator](std::string& text) {
+            return validator(text).empty() ? "" : "'" + text + "': expected " + expected;
+          },
+          validator.get_description()};
+}
+
+// Returns the message of an error that CLI11 found. `command` is the name of the command, or "".
+std::string message_of(const CLI::ParseError& error, const std::string& command) {
+  const std::string text = error.what();
+  const std::string option = text.substr(0, text.find(':'));
+  if (text.starts_with(option + ": At Most"))
+    return option + " is given several times: expected it once";
+  if (text.starts_with(option + ": ") && text.ends_with(" missing"))
+    return option + " has no value: expected one";
+  constexpr std::string_view kIsRequired = " is required";
+  if (!text.starts_with("-") && text.ends_with(kIsRequired))
+    return (command.empty() ? "" : command + ": ") + "the argument '" +
+           text.substr(0, text.size() - kIsRequired.size()) +
+           "' is missing: expected the arguments that 'voxdag help" +
+           (command.empty() ? "" : " " + command) + "' describes";
+  return text;
+}
+
 }  // namespace
 
 std::string path_problem(const std::string& path) {
@@ -130,12 +156,17 @@ Option Option::positive() {
   };
   return Option(option_->check(problem, "POSITIVE"));
 }
-Option Option::range(int low, int high) { return Option(option_->check(CLI::Range(low, high))); }
+Option Option::range(int low, int high) {
+  return Option(option_->check(
+      expecting("a whole number from " + std::to_string(low) + " to " + std::to_string(high),
+                CLI::Range(low, high))));
+}
 Option Option::range(double low, double high) {
-  return Option(option_->check(CLI::Range(low, high)));
+  return Option(option_->check(expecting(
+      "a number from " + number_text(low) + " to " + number_text(high), CLI::Range(low, high))));
 }
 Option Option::one_of(const std::vector<std::string>& values) {
-  return Option(option_->check(CLI::IsMember(values)));
+  return Option(option_->check(expecting("one of " + joined(values), CLI::IsMember(values))));
 }
 Option Option::check(std::string (*problem)(const std::string&)) {
   return Option(option_->check(problem));
@@ -252,7 +283,9 @@ int CommandLine::run(int argc, char** argv) {
       return status;
     }
     check_arguments(*app_);
-    throw Error(ErrorCode::kInvalidInput, error.what());
+    const auto commands = app_->get_subcommands();
+    throw Error(ErrorCode::kInvalidInput,
+                message_of(error, commands.empty() ? "" : commands.front()->get_name()));
   }
   return context_.exit_status;
 }

@@ -193,6 +193,20 @@ TEST_F(UnusualInput, NumbersAndMessages) {
   }
 }
 
+// Messages about the command line have the form of other messages: they say what is expected.
+TEST_F(UnusualInput, WrongArgumentsNameWhatIsExpected) {
+  const std::string once = "--resolution is given several times: expected it once";
+  expect_error(2, once, {"build", "m.glb", "-r", "64", "-r", "128", "-o", "m.vdag"});
+  expect_error(2, "--output has no value: expected one", {"build", "m.glb", "-o"});
+  expect_error(2, "diff: the argument 'b' is missing", {"diff", "m.vdag"});
+  expect_error(2, "--view: 'foo': expected one of auto, iso",
+               {"render", "m.vdag", "-o", "m.png", "--view", "foo"});
+  expect_error(2, "--fov: '171': expected a number from 1 to 170",
+               {"render", "m.vdag", "-o", "m.png", "--fov", "171"});
+  expect_error(2, "--threads: '0': expected a whole number from 1 to 1024",
+               {"reorder", "m.vdag", "-o", "n.vdag", "--threads", "0"});
+}
+
 // `build` and `plan` refuse a scene for which the disk has no space. The message of `build` names
 // the option --force; the message of `plan`, which has no such option, does not. The scene has 1000
 // * (2^32 - 1) instances of one triangle.
