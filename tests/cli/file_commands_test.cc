@@ -224,6 +224,12 @@ TEST_F(FileCommands, PlanNames) {
   for (const char* name : {"triangles", "subvolumes", "free_disk_bytes", "memory_budget_bytes"})
     EXPECT_GT(plan[name], 0) << name;
   EXPECT_FALSE(exists("m.glb.work"));
+  for (const std::string resolution : {"4", "64", "1024"}) {
+    const Json bytes = run_json({"plan", "m.glb", "-r", resolution})["file_bytes"];
+    const Json built = run_json({"build", "m.glb", "-r", resolution, "-o", "m.vdag"})["bytes"];
+    EXPECT_LE(bytes["low"], built) << resolution;
+    EXPECT_GE(bytes["high"], built) << resolution;
+  }
 }
 
 // The plan of a solid estimates the number of voxels in its interior. It also has the warnings

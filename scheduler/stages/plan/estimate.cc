@@ -6,8 +6,10 @@
 #include <optional>
 
 #include "core/base/error.h"
+#include "core/dag/brick.h"
 #include "core/fields/json_fields.h"
 #include "core/fields/json_text.h"
+#include "core/format/global/global_layout.h"
 #include "scheduler/solid/row_sums.h"
 #include "scheduler/solid/solid_report.h"
 #include "scheduler/spec/memory_plan.h"
@@ -239,6 +241,19 @@ void check_estimate(const Estimate& estimate, FileSystem& files, const std::stri
   check_disk("the global file", file, output_folder, output_free, progress);
 }
 
+// Returns the size of a file without colors: the header's page, the nodes, and the checksums. Each
+// level begins at a new page, so up to a page of zeros follows its nodes.
+EstimateRange file_size(const EstimateRange& node_bytes, uint32_t grid_levels) {
+  constexpr double kPage = global_layout::kPageBytes;
+  if (node_bytes.high == 0) return exactly(kPage);
+  const double levels = grid_levels + 1 - kBrickLevels;
+  const double least = kPage * (levels + 1);
+  const EstimateRange used = (1 + 8.0 / global_layout::kChecksumBlockBytes) * node_bytes +
+                             exactly(kPage + sizeof(uint64_t));
+  return {std::max(used.low, least), std::max(used.likely + levels * kPage / 2, least),
+          used.high + levels * kPage};
+}
+
 }  // namespace
 
 Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
@@ -271,7 +286,7 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
   const double bytes = std::max(
       pilot_bytes,
       std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMaxBytesPerNode));
-  estimate.file_bytes = bytes * estimate.dag_nodes + exactly(8192);
+  estimate.file_bytes = file_size(bytes * estimate.dag_nodes, scene.state.grid.levels);
 
   const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
   estimate.disk_bytes =
