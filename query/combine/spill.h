@@ -271,72 +271,92 @@ class SpillSorter {
   uint64_t left_ = 0;
 };
 
+// The items of a bucket are in chunks of the same size, which form a linked list in the file. So
+// the memory does not depend on the number of items.
 template <class T>
 class SpillBuckets {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(uint32_t) == 0);
+
  public:
   // The buffers of all buckets together take about `bytes`.
   SpillBuckets(const SpillSpace& space, size_t buckets, uint64_t bytes)
       : chunk_items_(std::bit_floor(std::clamp<uint64_t>(bytes / sizeof(T) / buckets, 4, 4096))),
-        buffers_(space.budget, chunk_items_ * buckets, kSpillBuffer),
-        file_(space.folder),
-        buckets_(buckets) {}
+        chunk_words_(chunk_items_ * kItemWords + kLinkWords),
+        buffers_(space.budget, chunk_words_ * buckets, kSpillBuffer),
+        buckets_(space.budget, buckets, kSpillBuffer),
+        file_(space.folder) {}
 
   void add(size_t bucket, const T& item) {
     Bucket& to = buckets_[bucket];
-    buffers_[bucket * chunk_items_ + to.buffered] = item;
-    ++to.size;
-    if (++to.buffered == chunk_items_) store(bucket);
+    if (to.size++ == 0) to.first = to.chunk = chunks_++;
+    std::memcpy(item_at(bucket, to.buffered), &item, sizeof(T));
+    if (++to.buffered == chunk_items_) store(bucket, chunks_++);
   }
+  // Completes the lists. Must be called after the last item was added, before next().
   void finish() {
     for (size_t bucket = 0; bucket < buckets_.size(); ++bucket) {
-      store(bucket);
-      buckets_[bucket].buffered = 0;
+      // The last chunk is written even if it is empty, because the file must not have gaps.
+      if (buckets_[bucket].size > 0) store(bucket, kNone);
+      rewind(bucket);
     }
   }
   uint64_t size(size_t bucket) const { return buckets_[bucket].size; }
-  // Returns the next item of the bucket, which must have one. The result is valid until the next
-  // call.
-  const T& next(size_t bucket) {
+  // Returns the next item of the bucket, which must have one.
+  T next(size_t bucket) {
     Bucket& from = buckets_[bucket];
-    T* const chunk = buffers_.data() + bucket * chunk_items_;
-    if (from.buffered == 0) load(from, chunk);
-    const T& item = chunk[chunk_items_ - from.buffered--];
+    if (from.buffered == 0) load(bucket);
+    T item;
+    std::memcpy(static_cast<void*>(&item), item_at(bucket, chunk_items_ - from.buffered--),
+                sizeof(T));
     return item;
   }
   // Moves back to the first item of the bucket.
   void rewind(size_t bucket) {
-    buckets_[bucket].loaded = 0;
+    buckets_[bucket].chunk = buckets_[bucket].first;
     buckets_[bucket].buffered = 0;
   }
 
  private:
+  static constexpr uint64_t kItemWords = sizeof(T) / sizeof(uint32_t);
+  static constexpr uint64_t kLinkWords = sizeof(uint64_t) / sizeof(uint32_t);
+  static constexpr uint64_t kNone = ~uint64_t{0};
+
   struct Bucket {
-    std::vector<uint64_t> chunks;  // numbers of the bucket's chunks in the file
+    uint64_t first = 0;  // number of the bucket's first chunk in the file
+    uint64_t chunk = 0;  // number of the chunk that is stored or loaded next
     uint64_t size = 0;
     // Items in the buffer. While the bucket is read, items of the current chunk that next() has not
     // returned yet; a chunk that is not full counts as a full one.
     uint64_t buffered = 0;
-    uint64_t loaded = 0;  // chunks that were loaded into the buffer
   };
-  void load(Bucket& from, T* chunk) {
-    file_.read(from.chunks[from.loaded++] * chunk_items_, chunk, chunk_items_);
+  // The buffer of a bucket has the items of a chunk, and then the number of the bucket's next
+  // chunk.
+  uint32_t* buffer(size_t bucket) { return buffers_.data() + bucket * chunk_words_; }
+  uint32_t* item_at(size_t bucket, uint64_t i) { return buffer(bucket) + i * kItemWords; }
+  uint32_t* link(size_t bucket) { return buffer(bucket) + chunk_items_ * kItemWords; }
+
+  void load(size_t bucket) {
+    Bucket& from = buckets_[bucket];
+    file_.read(from.chunk * chunk_words_, {buffer(bucket), chunk_words_});
+    std::memcpy(&from.chunk, link(bucket), sizeof(from.chunk));
     from.buffered = chunk_items_;
   }
-  // Writes the bucket's buffer as a chunk. Writes all of the buffer even if it is not full, so that
-  // all chunks have the same size.
-  void store(size_t bucket) {
+  // Writes the bucket's buffer as a chunk, even the part without items, because all chunks have the
+  // same size. `next` is the number of the bucket's next chunk.
+  void store(size_t bucket, uint64_t next) {
     Bucket& from = buckets_[bucket];
-    if (from.buffered == 0) return;
-    from.chunks.push_back(chunks_);
-    file_.write(chunks_++ * chunk_items_, buffers_.data() + bucket * chunk_items_, chunk_items_);
+    std::memcpy(link(bucket), &next, sizeof(next));
+    file_.write(from.chunk * chunk_words_, {buffer(bucket), chunk_words_});
+    from.chunk = next;
     from.buffered = 0;
   }
 
   const uint64_t chunk_items_;
-  PageBuffer<T> buffers_;
-  ItemFile<T> file_;
-  std::vector<Bucket> buckets_;
-  uint64_t chunks_ = 0;
+  const uint64_t chunk_words_;
+  PageBuffer<uint32_t> buffers_;
+  PageBuffer<Bucket> buckets_;
+  ScratchFile file_;
+  uint64_t chunks_ = 0;  // chunks that have a number
 };
 
 }  // namespace voxdag::query
