@@ -77,8 +77,9 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
 }
 
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
-                      std::span<const std::string> outputs, const BuildContext& context) {
+                      std::vector<std::string> outputs, const BuildContext& context) {
   FileSystem& files = context.files;
+  std::erase_if(outputs, [&](const std::string& path) { return !files.exists(path); });
   std::vector<std::string> own = WorkFolder::files_in(files, work_folder);
   const bool is_first = !own.empty() && !files.exists(WorkFolder::store_path(work_folder));
   own.insert(own.end(), outputs.begin(), outputs.end());

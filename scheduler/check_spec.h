@@ -1,8 +1,8 @@
 // Checks a build's spec before the build starts.
 #pragma once
 
-#include <span>
 #include <string>
+#include <vector>
 
 #include "scheduler/spec/build_spec.h"
 #include "scheduler/state/build_scene.h"
@@ -24,7 +24,7 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context);
 // - The work folder has files but no job store, so no earlier build has checked the scene.
 // - One of `outputs` begins with a zero byte, so it can be a file of voxdag or any other file.
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
-                      std::span<const std::string> outputs, const BuildContext& context);
+                      std::vector<std::string> outputs, const BuildContext& context);
 
 // Throws Error{kInvalidInput} if the output path is missing or names a folder, if the cache folder
 // is the work folder, or if the build would overwrite a scene or a file not created by voxdag.

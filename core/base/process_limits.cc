@@ -75,9 +75,13 @@ uint64_t cpus(uint64_t quota, uint64_t period) {
   return std::max<uint64_t>(1, (quota + period - 1) / period);
 }
 
-std::string own_membership() {
-  std::ifstream file("/proc/self/cgroup");
-  return {std::istreambuf_iterator<char>(file), {}};
+// Returns the contents of /proc/self/cgroup, which is read once.
+const std::string& own_membership() {
+  static const std::string membership = [] {
+    std::ifstream file("/proc/self/cgroup");
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }();
+  return membership;
 }
 
 constexpr const char* kCgroupMount = "/sys/fs/cgroup";

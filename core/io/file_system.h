@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -91,6 +92,8 @@ class FileSystem {
   // Creates an empty file at `path`. Returns false if anything exists at `path`.
   virtual bool create_new(const std::string& path) = 0;
   virtual bool exists(const std::string& path) = 0;
+  // Returns the identity of the regular file at `path`; nullopt if there is none. Follows links.
+  virtual std::optional<FileIdentity> identify(const std::string& path) = 0;
   virtual void rename(const std::string& from, const std::string& to) = 0;
   // Renames `from` to `to` in one step. If anything exists at `to`, returns false and renames
   // nothing.

@@ -30,6 +30,9 @@ class ForwardingFiles : public FileSystem {
   }
   bool create_new(const std::string& path) override { return files_.create_new(path); }
   bool exists(const std::string& path) override { return files_.exists(path); }
+  std::optional<FileIdentity> identify(const std::string& path) override {
+    return files_.identify(path);
+  }
   void rename(const std::string& from, const std::string& to) override { files_.rename(from, to); }
   bool rename_new(const std::string& from, const std::string& to) override {
     return files_.rename_new(from, to);

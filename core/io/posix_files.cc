@@ -78,6 +78,14 @@ int open_to_change(const char* call, const std::string& path, Contents contents)
               path + " is a symbolic link: expected a regular file that voxdag wrote");
 }
 
+FileIdentity identity_of(const struct stat& s) {
+  const auto nanoseconds = [](const timespec& t) {
+    return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
+  };
+  return {s.st_ino, static_cast<uint64_t>(s.st_size), nanoseconds(s.st_mtim),
+          nanoseconds(s.st_ctim)};
+}
+
 class PosixReadableFile : public ReadableFile {
  public:
   // `more_flags` is O_NOFOLLOW or 0.
@@ -90,11 +98,7 @@ class PosixReadableFile : public ReadableFile {
     if (!S_ISREG(s.st_mode))
       throw Error(ErrorCode::kInvalidInput,
                   path + " is not a regular file: expected a file, not a folder, pipe or device");
-    const auto nanoseconds = [](const timespec& t) {
-      return int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec;
-    };
-    identity_ = {s.st_ino, static_cast<uint64_t>(s.st_size), nanoseconds(s.st_mtim),
-                 nanoseconds(s.st_ctim)};
+    identity_ = identity_of(s);
   }
   const std::string& path() const override { return path_; }
   uint64_t size() const override { return identity_.bytes; }
@@ -197,6 +201,11 @@ class PosixFileSystem : public FileSystem {
     if (stat(path.c_str(), &s) == 0) return true;
     if (errno == ENOENT || errno == ENOTDIR) return false;
     fail("look for", path, errno);
+  }
+  std::optional<FileIdentity> identify(const std::string& path) override {
+    struct stat s {};
+    if (stat(path.c_str(), &s) != 0 || !S_ISREG(s.st_mode)) return std::nullopt;
+    return identity_of(s);
   }
   void rename(const std::string& from, const std::string& to) override {
     if (::rename(from.c_str(), to.c_str()) != 0) fail("rename", from + " to " + to, errno);

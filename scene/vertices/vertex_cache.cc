@@ -66,14 +66,20 @@ void VertexCache::load(uint64_t block, size_t slot) {
   block_in_slot_[slot] = block;
 }
 
-// Reads the vertices of a block from the source, untransformed.
+// Reads the vertices of a block from the source, untransformed. If all vertices of the source fit
+// in untransformed_, also reads the blocks after it up to a multiple of kBlocksPerRead.
 void VertexCache::read(uint64_t block, std::span<double> out) {
-  const uint64_t first = block * kBlockVertices;
-  if (is_read_.empty()) return source_->read(first, out.size() / 3, out.data());
-  double* const retained = &untransformed_[3 * first];
-  if (!is_read_[block]) source_->read(first, out.size() / 3, retained);
-  is_read_[block] = true;
-  std::copy_n(retained, out.size(), out.begin());
+  if (is_read_.empty()) return source_->read(block * kBlockVertices, out.size() / 3, out.data());
+  if (!is_read_[block]) {
+    uint64_t end = block + 1;
+    while (end < is_read_.size() && end % kBlocksPerRead != 0 && !is_read_[end]) ++end;
+    const uint64_t first = block * kBlockVertices;
+    const uint64_t count = std::min(end * kBlockVertices, source_->count()) - first;
+    source_->read(first, static_cast<size_t>(count), &untransformed_[3 * first]);
+    std::fill(is_read_.begin() + static_cast<ptrdiff_t>(block),
+              is_read_.begin() + static_cast<ptrdiff_t>(end), true);
+  }
+  std::copy_n(&untransformed_[3 * block * kBlockVertices], out.size(), out.begin());
 }
 
 }  // namespace voxdag

@@ -50,6 +50,7 @@ class VertexCache {
 
  private:
   static constexpr uint64_t kBlockVertices = 1024;
+  static constexpr uint64_t kBlocksPerRead = 8;
   static constexpr uint64_t kMaxRetainedBlocks = 256;
   static constexpr uint64_t kNoBlock = ~uint64_t{0};
 

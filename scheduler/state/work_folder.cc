@@ -20,8 +20,9 @@ namespace {
 constexpr std::string_view kLockName = "lock";
 constexpr std::string_view kScratchName = "merge";
 constexpr std::string_view kClusterName = "cluster";
-// Number of threads that remove files. A thread takes half a second per GB of a cached file.
-constexpr unsigned kRemovers = 4;
+// Maximum number of threads that remove files. A thread takes 0.5 s per GB of a cached file.
+constexpr size_t kMaxRemovers = 4;
+constexpr size_t kFilesPerRemover = 4;
 
 // Returns the id in "segment-<id>.vdseg".
 std::optional<uint32_t> segment_id(std::string_view name) {
@@ -254,7 +255,9 @@ void WorkFolder::remove() {
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName &&
           path_ + "/" + entry.name != rows_path())
         others.push_back(path_ + "/" + entry.name);
-    parallel_for(kRemovers, others.size(), [&](unsigned, size_t i) { files_.remove(others[i]); });
+    const size_t removers = std::min(others.size() / kFilesPerRemover, kMaxRemovers);
+    parallel_for(static_cast<unsigned>(removers), others.size(),
+                 [&](unsigned, size_t i) { files_.remove(others[i]); });
     remove_rows();
     remove_cluster_files();
     if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());

@@ -23,6 +23,11 @@ class MemoryFiles : public FileSystem {
     return std::make_unique<File>(path, found->second);
   }
   bool exists(const std::string& path) override { return contents.contains(path); }
+  std::optional<FileIdentity> identify(const std::string& path) override {
+    const auto found = contents.find(path);
+    if (found == contents.end()) return std::nullopt;
+    return FileIdentity{0, found->second.size(), 0, 0};
+  }
   std::unique_ptr<ReadableFile> open_own(const std::string& path) override {
     return open_read(path);
   }

@@ -62,11 +62,9 @@ void GuardedOutputs::set(const std::string& path, const Replaceable& replaceable
 }
 
 GuardedOutputs::Replaceable GuardedOutputs::file_at(const std::string& path, bool is_own) {
-  try {
-    return {true, is_own, files().open_read(path)->identity()};
-  } catch (const Error&) {
-    return {};
-  }
+  const auto identity = files().identify(path);
+  if (!identity) return {};
+  return {true, is_own, *identity};
 }
 
 bool GuardedOutputs::is_at(const std::string& path, const Replaceable& expected) {

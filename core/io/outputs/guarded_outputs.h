@@ -41,7 +41,7 @@ class GuardedOutputs : public ForwardingFiles {
 
   std::optional<Replaceable> find(const std::string& path);
   void set(const std::string& path, const Replaceable& replaceable);
-  // Returns the file at `path`, if it is a regular file that can be read.
+  // Returns the file at `path`, if it is a regular file.
   Replaceable file_at(const std::string& path, bool is_own);
   // True if `expected` still is the file at `path`.
   bool is_at(const std::string& path, const Replaceable& expected);

@@ -5,11 +5,10 @@
 #include <exception>
 #include <mutex>
 #include <optional>
-#include <thread>
 
-#include "core/base/clock.h"
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/parallel_for.h"
 #include "core/base/text.h"
 #include "core/format/artifact/artifact_writer.h"
 #include "scheduler/solid/full_cubes.h"
@@ -255,15 +254,8 @@ ExecutorCounts build_subvolumes(const ExecutorOptions& options,
       }
     }
   };
-  std::vector<std::thread> threads;
-  queue.guard([&] {
-    for (size_t i = 0; i < workers.size(); ++i)
-      threads.emplace_back([&, i] {
-        queue.guard([&] { work(*workers[i]); });
-        ThreadTimes::add(i);
-      });
-  });
-  for (std::thread& thread : threads) thread.join();
+  parallel_for(static_cast<unsigned>(workers.size()), workers.size(),
+               [&](unsigned, size_t i) { queue.guard([&] { work(*workers[i]); }); });
   ExecutorCounts counts;
   for (const auto& worker : workers) {
     counts.split += worker->counts.split;
