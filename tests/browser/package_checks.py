@@ -88,7 +88,9 @@ def check_host(visitor, url, host, camera, reference):
     """The picture is the same from every server, and the page requests no range in vain. Loads the
     compressed viewer, unless the policy of the server forbids it."""
     ranges, modules = [], []
-    visitor.page.on("request", lambda request: ranges.append(request.headers.get("range")))
+    visitor.page.on(
+        "request", lambda request: ranges.append((request.url, request.headers.get("range")))
+    )
     visitor.page.on(
         "request",
         lambda request: modules.extend(re.findall(r"/viewer-[0-9a-f]+(\.js)$", request.url)),
@@ -97,8 +99,12 @@ def check_host(visitor, url, host, camera, reference):
     visitor.show(camera)
     depths, _ = visitor.capture(WIDTH, HEIGHT)
     assert_equal(reference, depths, camera, f"a package from a server of kind {host}")
-    count = len([each for each in ranges if each])
-    assert (count > 1) == (host in HOSTS_OF_RANGES), f"{host}: {count} requests for ranges"
+    ranges = [(url, RANGE.match(asked)) for url, asked in ranges if asked]
+    assert (len(ranges) > 1) == (host in HOSTS_OF_RANGES), f"{host}: {ranges}"
+    if host in HOSTS_OF_RANGES:
+        places = sorted((url, int(asked[1]), int(asked[2])) for url, asked in ranges)
+        for (url, _, end), (next_url, begin, _) in zip(places, places[1:]):
+            assert (url, end) < (next_url, begin), f"{url}: byte {begin} is requested twice"
     assert len(modules) == (host == "strict"), f"{host}: {len(modules)} plain modules"
     if host == "strict":
         violations = visitor.page.evaluate("window.violations.splice(0)")

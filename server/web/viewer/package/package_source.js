@@ -8,11 +8,10 @@ import {tileShape} from "../tiles/tile_format.js";
 
 import {decodeColorBlock, gunzip, mortonCode, TileBlock} from "./block_format.js";
 import {Directory} from "./directory.js";
+import {Segments} from "./segments.js";
 
 const kFormat = "voxdag package", kVersions = [1, 2];
 const kBlockTiles = 64;
-const kMaxGap = 16 * 1024;         // maximum bytes between two blocks of one request
-const kMaxRange = 1 << 20;         // maximum bytes of one request
 const kMaxCachedBytes = 32 << 20;  // limit for decompressed blocks in memory
 const kMaxTileBatches = 2, kMaxBatchTiles = 512;
 const kLookAgainMs = 5000;
@@ -30,6 +29,7 @@ export class PackageSource {
   // `files` is a PackageFiles, or an object with the same functions (EmbeddedFiles).
   constructor(files) {
     this.files = files;
+    this.segments = new Segments(files);
     this.info = null;
     this.ended = null;  // {code, message} once the package was removed or replaced
     this.damage = {
@@ -149,8 +149,7 @@ export class PackageSource {
     return answers;
   }
 
-  // Begins to load the blocks of the list `blocks` that are not in this.blocks. One request fetches
-  // several blocks that are close together in a pack.
+  // Begins to load the blocks of the list `blocks` that are not in this.blocks.
   async load(blocks, options) {
     const wanted = [];
     for (const block of blocks) {
@@ -164,7 +163,22 @@ export class PackageSource {
       if (error) request.reject(error);
       return {...request, ...value, error};
     }));
-    for (const group of merged(places.filter(({error}) => !error))) this.fetchGroup(group, options);
+    const known = places.filter(({error}) => !error), reads = this.segments.read(known, options);
+    known.forEach((place, i) => place.resolve(this.decodeRead(place, reads[i], options)));
+  }
+
+  // Decodes the bytes of a place. If they are damaged and no answer to a range request was correct
+  // so far, the server possibly sends wrong ranges. In this case, fetches the complete file.
+  async decodeRead(place, reads, options) {
+    const bytes = await reads, {files} = this;
+    try {
+      return await this.decode(place.block, bytes);
+    } catch (error) {
+      if (!bytes.isRange || files.rangesAreProven) throw error;
+    }
+    files.hasRanges = false;
+    this.segments.forget(place);
+    return this.decode(place.block, await this.segments.read([place], options)[0]);
   }
 
   // Adds a promise of the block to this.blocks. This is done before the block is requested, so that
@@ -180,29 +194,10 @@ export class PackageSource {
     return request;
   }
 
-  fetchGroup(group, options) {
-    const {file, offset} = group[0], last = group.at(-1);
-    const length = last.offset + last.bytes - offset;
-    const read = () => this.files.read(file, offset, length, options);
-    const reads = read();
-    for (const each of group) {
-      const part = (bytes) => bytes.subarray(each.offset - offset).subarray(0, each.bytes);
-      const decode = (bytes) => this.decode(each.block, part(bytes), bytes.isRange);
-      each.resolve(reads.then((bytes) => decode(bytes).catch((error) => {
-        // If no answer to a range request was correct so far, the server possibly sends wrong
-        // ranges. In this case, fetches the complete file.
-        if (!bytes.isRange || this.files.rangesAreProven || !this.files.hasRanges) throw error;
-        this.files.hasRanges = false;
-        return read().then(decode);
-      })));
-    }
-  }
-
-  // Decodes a block. `isRange` is true if `bytes` is from the answer to a range request.
-  async decode(block, bytes, isRange) {
+  async decode(block, bytes) {
     try {
       const plain = await gunzip(bytes), decoded = this.parse(block, plain);
-      if (isRange) this.files.rangesAreProven = true;
+      if (bytes.isRange) this.files.rangesAreProven = true;
       decoded.byteSize = plain.length;
       this.cachedBytes += plain.length;
       return decoded;
@@ -264,20 +259,4 @@ function missing(block) {
 // True if the error concerns one file or block. Other files and blocks can still be loaded.
 function isOfOneItem(error) {
   return error instanceof TileError && (error.isMissing || error.status === 200);
-}
-
-// Sorts the places of blocks and divides them into groups. The blocks of a group are close together
-// in one file and are fetched with one request.
-function merged(places) {
-  places.sort((a, b) => a.block - b.block);
-  const groups = [];
-  for (const place of places) {
-    const group = groups.at(-1), first = group?.[0], last = group?.at(-1);
-    const isClose = group && first.file === place.file &&
-        place.offset - last.offset - last.bytes <= kMaxGap &&
-        place.offset + place.bytes - first.offset <= kMaxRange;
-    if (isClose) group.push(place);
-    else groups.push([place]);
-  }
-  return groups;
 }
