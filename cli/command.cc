@@ -130,7 +130,7 @@ std::string message_of(const CLI::ParseError& error, const std::string& command)
   if (!text.starts_with("-") && text.ends_with(kIsRequired))
     return (command.empty() ? "" : command + ": ") + "the argument '" +
            text.substr(0, text.size() - kIsRequired.size()) +
-           "' is missing: expected the arguments that 'voxdag help" +
+           "' is required: expected the arguments that 'voxdag help" +
            (command.empty() ? "" : " " + command) + "' describes";
   return text;
 }

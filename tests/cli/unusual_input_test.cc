@@ -198,7 +198,7 @@ TEST_F(UnusualInput, WrongArgumentsNameWhatIsExpected) {
   const std::string once = "--resolution is given several times: expected it once";
   expect_error(2, once, {"build", "m.glb", "-r", "64", "-r", "128", "-o", "m.vdag"});
   expect_error(2, "--output has no value: expected one", {"build", "m.glb", "-o"});
-  expect_error(2, "diff: the argument 'b' is missing", {"diff", "m.vdag"});
+  expect_error(2, "diff: the argument 'b' is required", {"diff", "m.vdag"});
   expect_error(2, "--view: 'foo': expected one of auto, iso",
                {"render", "m.vdag", "-o", "m.png", "--view", "foo"});
   expect_error(2, "--fov: '171': expected a number from 1 to 170",
