@@ -34,6 +34,11 @@ class MemoryFiles : public voxdag::FileSystem {
   }
   void remove(const std::string& path) override { files.erase(path); }
   bool exists(const std::string& path) override { return files.contains(path); }
+  std::optional<voxdag::FileIdentity> identify(const std::string& path) override {
+    const auto found = files.find(path);
+    if (found == files.end()) return std::nullopt;
+    return voxdag::FileIdentity{0, found->second.size(), 0, 0};
+  }
   void sync_directory(const std::string&) override {}
 
   std::unique_ptr<voxdag::ReadableFile> open_read(const std::string&) override { unexpected(); }
