@@ -34,6 +34,7 @@ struct VerifyCommand {
   bool thin = false;
   uint64_t seed = 1;
   std::string memory;
+  std::string work;
   unsigned threads = default_threads();
   bool quick = false;
   bool quiet = false;
@@ -120,12 +121,14 @@ void print(const voxdag_reader::File& file, const std::optional<Sample>& sample)
 }
 
 nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_reader::File& file,
-                                   const std::optional<Sample>& sample) {
+                                   uint64_t work_bytes, const std::optional<Sample>& sample) {
   nlohmann::ordered_json json{{"ok", true},
                               {"voxels", file.voxels()},
                               {"svo_nodes", file.svo_nodes()},
                               {"dag_nodes", file.dag_nodes()},
-                              {"bytes", file.file_bytes()}};
+                              {"bytes", file.file_bytes()},
+                              {"work_bytes", work_bytes},
+                              {"peak_rss_bytes", peak_resident_bytes()}};
   if (sample)
     json["against"] = {{"seed", command.seed},
                        {"boxes", sample->voxels.boxes},
@@ -149,22 +152,30 @@ void check_radius(const VerifyCommand& command) {
                                             ", with --solid enclosed");
 }
 
+// Returns the beginning of the paths of temporary folders.
+std::string work_prefix(const VerifyCommand& command) {
+  if (command.work.empty()) return command.path + ".work-";
+  return command.work + "/" + command.path.substr(command.path.rfind('/') + 1) + ".work-";
+}
+
 void run(const VerifyCommand& command, CommandContext& context) {
   check_radius(command);
   const auto file = open_global_file(command.path);
   const WatchedFile watched(*file);
   const auto progress = make_progress_bar(command.quiet);
-  MemoryBudget budget(~uint64_t{0});
-  PageLimit pages(*file, memory_limit(command.memory));
+  const uint64_t memory_bytes = memory_limit(command.memory);
+  MemoryBudget budget(memory_bytes);
+  PageLimit pages(*file, memory_bytes, std::min(PageLimit::kIntervalBytes, memory_bytes / 8));
+  VerifyScratch scratch(context.files, work_prefix(command));
   std::optional<Sample> sample;
   watched.run([&] {
     verify_global_file(*file, command.threads, budget, *progress, context.cancel,
-                       global_layout::kNarrowLevelWords, command.quick, &pages);
+                       global_layout::kNarrowLevelWords, command.quick, &pages, &scratch);
     if (!command.scenes.empty()) sample = check_against(command, *file, *progress, context);
     watched.check_readable();
   });
   if (command.json)
-    print_json(verify_json(command, *file, sample));
+    print_json(verify_json(command, *file, scratch.bytes_written(), sample));
   else
     print(*file, sample);
 }
@@ -175,8 +186,11 @@ void declare(Command& command, VerifyCommand& state) {
                  "compare a sample of voxels, and of colors, with the triangles of this scene");
   command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
   command.option("--memory", state.memory,
-                 "memory for the scene of --against, and limit above which pages of the file are "
-                 "dropped from memory; default: half the RAM");
+                 "memory for tables and for the scene of --against, and limit above which pages "
+                 "of the file are dropped; default: half the RAM");
+  command.option("--work", state.work,
+                 "folder for temporary files if the tables do not fit in --memory; default: the "
+                 "folder of the file");
   command.flag("--skip-invalid", state.scene_options.skip_invalid,
                "drop invalid triangles of the scene, as the build did");
   command.option("--cutouts", state.cutouts, "skip or keep, as in the build")

@@ -1,20 +1,16 @@
-// Finds the word offsets at which the nodes of a level of the global file begin. Nodes vary in
-// size, so this requires a walk over the level from its first word. To use several threads, the
-// level is cut into spans. Each span but the first is walked from a word that looks like the
-// beginning of a node. If the last node of the previous span does not end at this word, the span is
-// walked again.
+// Maps the word offsets at which the nodes of a level of the global file begin to the indexes of
+// the nodes.
 #pragma once
 
 #include <algorithm>
 #include <bit>
-#include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
+#include "core/format/global/node_spans.h"
 #include "core/format/global/voxdag_reader.h"
 #include "voxdag/cancel_token.h"
 
@@ -22,35 +18,24 @@
 
 namespace voxdag {
 
-class PageLimit;
-
-// The kind of child pointers in the nodes of a level. Bricks have none.
-enum class Pointers { kNone, kNarrow, kWide };
-
 // Maps the word offset at which a node begins to the node's index in its level. Takes 2 bits of
 // memory per word of the level, and nothing for bricks. Immutable after construction.
 class NodeIndex {
  public:
   static constexpr uint64_t kNone = ~uint64_t{0};
-  static constexpr uint64_t kSpanWords = uint64_t{1} << 16;  // a multiple of 64
-
-  // Describes 64 words of the level.
-  struct Words {
-    uint64_t starts = 0;  // one bit per word: set if a node begins there
-    uint64_t before = 0;  // number of nodes that begin before the 64 words
-  };
+  static constexpr uint64_t kSpanWords = NodeSpans::kSpanWords;
 
   // The functions of a NodeIndex for loops over many offsets. They are always inlined, so that
   // sources that are compiled for different instruction sets can call them. The index must outlive
   // the Lookup.
   struct Lookup {
-    const Words* words = nullptr;  // null for bricks
+    const NodeWords* words = nullptr;  // null for bricks
     uint64_t word_count = 0;
 
     VOXDAG_INLINE uint64_t find(uint64_t offset) const {
       if (offset >= word_count) return kNone;
       if (!words) return offset % 2 == 0 ? offset / 2 : kNone;
-      const Words& found = words[offset / 64];
+      const NodeWords& found = words[offset / 64];
       const uint64_t bit = uint64_t{1} << offset % 64;
       if (!(found.starts & bit)) return kNone;
       return found.before + static_cast<uint64_t>(__builtin_popcountll(found.starts & (bit - 1)));
@@ -69,6 +54,11 @@ class NodeIndex {
   NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsigned threads,
             MemoryBudget& budget, const CancelToken& cancel, const std::string& where,
             PageLimit* pages = nullptr);
+  // Makes an index of the spans `first` to `end` - 1 of a level. Only find() and lookup() may be
+  // used. Their offsets and indexes count from the first word, and from the first node that begins,
+  // in these spans.
+  NodeIndex(const NodeSpans& spans, uint64_t first, uint64_t end, unsigned threads,
+            MemoryBudget& budget);
 
   // Returns the index of the node that begins at `offset`; kNone if no node begins there.
   uint64_t find(uint64_t offset) const { return lookup().find(offset); }
@@ -95,21 +85,11 @@ class NodeIndex {
   uint64_t last_before(uint64_t span) const;
 
  private:
-  struct Span {
-    uint64_t begin = 0;  // word offset of its first node
-    uint64_t end = 0;    // word offset of the end of its last node
-    uint64_t nodes = 0;
-    bool broken = false;  // no node can begin at `end`
-  };
-
-  uint64_t words_of_node(uint64_t at) const;
-  uint64_t guess_begin(uint64_t span) const;
-  Span walk(uint64_t span, uint64_t begin);
-  uint64_t join(std::span<Span> spans, const CancelToken& cancel, const std::string& where);
+  void count_before(uint64_t spans, uint64_t span_words, unsigned threads);
 
   voxdag_reader::Level level_;
   Pointers pointers_ = Pointers::kNone;
-  PageBuffer<Words> words_;
+  PageBuffer<NodeWords> words_;
 };
 
 }  // namespace voxdag

@@ -13,13 +13,35 @@
 
 namespace voxdag {
 
-// A level above the bricks, with the index and the table of the next finer level.
+// Finds the values of children in a list, in which they are grouped by windows: ranges of words of
+// the child level. The pointers must be passed in the order of the values of each window.
+struct ChildSlots {
+  int window_shift = 0;  // a window has 2^window_shift words
+  uint64_t windows = 1;
+  uint64_t count = 0;        // values in the list
+  uint32_t* next = nullptr;  // by window: index of the next value
+
+  VOXDAG_INLINE uint64_t window_of(uint64_t pointer) const {
+    const uint64_t window = pointer >> window_shift;
+    return window < windows ? window : windows - 1;
+  }
+  // Returns the index of the next value, which belongs to `pointer`. If there is none, returns
+  // NodeIndex::kNone; this is possible only if the level has changed.
+  VOXDAG_INLINE uint64_t take(uint64_t pointer) const {
+    const uint64_t slot = next[window_of(pointer)]++;
+    return slot < count ? slot : NodeIndex::kNone;
+  }
+};
+
+// A level above the bricks, with the index and the table of the next finer level. If `slots` is not
+// null, it is used instead of `below`, and `children` has its list.
 struct NodeLevel {
   voxdag_reader::Level nodes;
   uint32_t hash_bits = 64;
   bool is_wide = false;  // true if child pointers have two words
   NodeIndex::Lookup below;
   SubtreeWords children;
+  const ChildSlots* slots = nullptr;
 };
 
 struct NodeBatch {
@@ -53,7 +75,10 @@ class BatchComputer {
 
   VOXDAG_INLINE void run() {
     collect_pointers();
-    find_children();
+    if (level_.slots)
+      find_slots();
+    else
+      find_children();
     if (level_.children.is_small)
       combine<true>();
     else
@@ -94,6 +119,14 @@ class BatchComputer {
       level_.children.prefetch(child);
     }
   }
+  VOXDAG_INLINE void find_slots() {
+    batch_.valid = batch_.count;
+    for (uint32_t p = 0; p < first_[batch_.count]; ++p) {
+      const uint64_t slot = level_.slots->take(pointers_[p]);
+      if (slot == NodeIndex::kNone || level_.children.is_broken(slot)) return stop_before(p);
+      pointers_[p] = slot;
+    }
+  }
   void stop_before(uint32_t pointer) {
     while (first_[batch_.valid] > pointer) --batch_.valid;
     batch_.broken_child = static_cast<int>(pointer - first_[batch_.valid]);
@@ -108,11 +141,11 @@ class BatchComputer {
         uint32_t* const child = level_.children.words + (kIsSmall ? 3 : 6) * pointers_[p];
         state = node_hash_add(state, SubtreeWords::word64(child));
         if constexpr (kIsSmall) {
-          voxels += remove_parent_bit(child + 2, SubtreeWords::kSmallParentBit);
+          voxels += SubtreeWords::remove_parent_bit(child + 2, SubtreeWords::kSmallParentBit);
         } else {
           voxels += SubtreeWords::word64(child + 2);
-          svo_nodes +=
-              remove_parent_bit(reinterpret_cast<uint64_t*>(child + 4), SubtreeWords::kParentBit);
+          svo_nodes += SubtreeWords::remove_parent_bit(reinterpret_cast<uint64_t*>(child + 4),
+                                                       SubtreeWords::kParentBit);
         }
       }
       if constexpr (kIsSmall) {
@@ -122,14 +155,6 @@ class BatchComputer {
       batch_.subtrees[i] = {truncate_hash(node_hash_end(state), level_.hash_bits), voxels,
                             svo_nodes + 1};
     }
-  }
-  // Sets `bit` in a word that several threads may change in this way. Returns the word without this
-  // bit.
-  template <class Word>
-  VOXDAG_INLINE static Word remove_parent_bit(Word* at, Word bit) {
-    const Word word = __atomic_load_n(at, __ATOMIC_RELAXED);
-    if (!(word & bit)) __atomic_store_n(at, word | bit, __ATOMIC_RELAXED);
-    return word & ~bit;
   }
 
   const NodeLevel& level_;

@@ -11,11 +11,13 @@
 //
 // The sum of eight such words without bit 31 has at most 2^18 voxels in its bits 0-18, and the
 // octree nodes from bit 19 on. A node of another level takes three words of 64 bits: hash, voxels
-// and octree nodes, with bit 63 instead of bit 31.
+// and octree nodes, with bit 63 instead of bit 31. Values that mean "no such node" have ones in all
+// bits.
 #pragma once
 
 #include <cstdint>
 #include <cstring>
+#include <span>
 
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
@@ -53,6 +55,33 @@ struct SubtreeWords {
     return word;
   }
   VOXDAG_INLINE uint64_t hash(uint64_t i) const { return word64(node(i)); }
+  // Makes the values of node i mean "no such node". No subtree has so many voxels.
+  VOXDAG_INLINE void set_broken(uint64_t i) const {
+    for (uint32_t* word = node(i); word < node(i + 1); ++word) *word = ~uint32_t{0};
+  }
+  VOXDAG_INLINE bool is_broken(uint64_t i) const {
+    return is_small ? node(i)[2] == ~uint32_t{0} : word64(node(i) + 2) == ~uint64_t{0};
+  }
+  // Copies the values of node i to `to`, without the bit that tells whether the node has a parent.
+  // Sets this bit in the node.
+  VOXDAG_INLINE void copy_to_parent(uint64_t i, uint32_t* to) const {
+    uint32_t* const from = node(i);
+    std::memcpy(to, from, (is_small ? 2 : 4) * sizeof(uint32_t));
+    if (is_small) {
+      to[2] = remove_parent_bit(from + 2, kSmallParentBit);
+    } else {
+      const uint64_t last = remove_parent_bit(reinterpret_cast<uint64_t*>(from + 4), kParentBit);
+      std::memcpy(to + 4, &last, sizeof(last));
+    }
+  }
+  // Sets `bit` in a word that several threads may change in this way. Returns the word without this
+  // bit.
+  template <class Word>
+  VOXDAG_INLINE static Word remove_parent_bit(Word* at, Word bit) {
+    const Word word = __atomic_load_n(at, __ATOMIC_RELAXED);
+    if (!(word & bit)) __atomic_store_n(at, word | bit, __ATOMIC_RELAXED);
+    return word & ~bit;
+  }
 };
 
 // The tables of two consecutive levels exist at the same time. Several threads may set different
@@ -62,11 +91,18 @@ class SubtreeTable {
   SubtreeTable() = default;
   // Makes a table for `nodes` nodes whose cubes have 2^`cube_levels` voxels per edge.
   SubtreeTable(MemoryBudget& budget, uint64_t nodes, uint32_t cube_levels)
-      : words_(budget, nodes * (is_small(cube_levels) ? 3 : 6), "hashes and counts of a level"),
+      : words_(budget, nodes * node_words(cube_levels), "hashes and counts of a level"),
         size_(nodes),
         is_small_(is_small(cube_levels)) {}
 
+  // Returns the number of words per node.
+  static uint32_t node_words(uint32_t cube_levels) { return is_small(cube_levels) ? 3 : 6; }
+
   uint64_t size() const { return size_; }
+  // Returns the words of `nodes` nodes, beginning with node `first`.
+  std::span<uint32_t> words_of(uint64_t first, uint64_t nodes) {
+    return {words().node(first), words().node(first + nodes)};
+  }
   SubtreeWords words() { return {words_.data(), is_small_}; }
 
   uint64_t hash(uint64_t i) const { return SubtreeWords::word64(node(i)); }

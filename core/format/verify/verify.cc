@@ -12,6 +12,7 @@
 #include "core/format/global/checked_blocks.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
+#include "core/format/verify/checked_level.h"
 #include "core/format/verify/verify_colors.h"
 #include "core/format/verify/verify_nodes.h"
 
@@ -25,24 +26,15 @@ constexpr uint64_t kBlocksPerItem = 64;  // checksum blocks, 4 MiB together
 
 class Verifier {
  public:
-  Verifier(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
-           Progress& progress, const CancelToken& cancel, uint64_t narrow_words, bool is_quick,
-           PageLimit& pages)
-      : file_(file),
-        threads_(threads),
-        budget_(budget),
-        progress_(progress),
-        cancel_(cancel),
-        narrow_words_(narrow_words),
-        is_quick_(is_quick),
-        pages_(pages) {}
+  Verifier(const VerifyTask& task, uint64_t narrow_words)
+      : task_(task), file_(task.file), narrow_words_(narrow_words) {}
 
   void run() {
     check_header();
     check_blocks();
     check_padding();
-    verify_nodes(file_, threads_, budget_, progress_, cancel_, is_quick_, pages_);
-    verify_colors(file_, threads_, progress_, cancel_, pages_);
+    verify_nodes(task_);
+    verify_colors(file_, task_.threads, task_.progress, task_.cancel, task_.pages);
   }
 
  private:
@@ -60,14 +52,9 @@ class Verifier {
   void check_padding() const;
   void check_zeros(uint64_t begin, uint64_t end, const std::string& what) const;
 
+  const VerifyTask& task_;
   const voxdag_reader::File& file_;
-  const unsigned threads_;
-  MemoryBudget& budget_;
-  Progress& progress_;
-  const CancelToken& cancel_;
   const uint64_t narrow_words_;
-  const bool is_quick_;
-  PageLimit& pages_;
 };
 
 void Verifier::check_zeros(uint64_t begin, uint64_t end, const std::string& what) const {
@@ -180,19 +167,19 @@ void Verifier::check_blocks() {
   const uint64_t bytes = file_.checksum_table_offset() - kPageBytes;
   const CheckedBlocks checked(file_);
   const uint64_t blocks = checked.count();
-  progress_.begin_stage("verify checksums", bytes, "bytes");
-  parallel_for(threads_, (blocks + kBlocksPerItem - 1) / kBlocksPerItem,
+  task_.progress.begin_stage("verify checksums", bytes, "bytes");
+  parallel_for(task_.threads, (blocks + kBlocksPerItem - 1) / kBlocksPerItem,
                [&](unsigned, size_t item) {
                  const uint64_t first = item * kBlocksPerItem;
                  const uint64_t end = std::min(first + kBlocksPerItem, blocks);
                  for (uint64_t block = first; block < end; ++block) checked.compare(block);
                  const uint64_t read =
                      std::min(end * kChecksumBlockBytes, bytes) - first * kChecksumBlockBytes;
-                 progress_.advance(read);
-                 pages_.touch(read);
-                 cancel_.check();
+                 task_.progress.advance(read);
+                 task_.pages.touch(read);
+                 task_.cancel.check();
                });
-  progress_.end_stage();
+  task_.progress.end_stage();
 }
 
 void Verifier::check_padding() const {
@@ -208,11 +195,11 @@ void Verifier::check_padding() const {
 
 void verify_global_file(const voxdag_reader::File& file, unsigned threads, MemoryBudget& budget,
                         Progress& progress, const CancelToken& cancel, uint64_t narrow_words,
-                        bool is_quick, PageLimit* pages) {
+                        bool is_quick, PageLimit* pages, VerifyScratch* scratch) {
   PageLimit unlimited(file, ~uint64_t{0});
-  Verifier(file, threads, budget, progress, cancel, narrow_words, is_quick,
-           pages ? *pages : unlimited)
-      .run();
+  const VerifyTask task{
+      file, threads, budget, progress, cancel, is_quick, pages ? *pages : unlimited, scratch};
+  Verifier(task, narrow_words).run();
 }
 
 }  // namespace voxdag

@@ -5,12 +5,8 @@
 
 #include <cstdint>
 
-#include "core/base/memory_budget.h"
-#include "core/format/global/node_index.h"
-#include "core/format/global/page_limit.h"
 #include "core/format/global/voxdag_reader.h"
-#include "core/format/verify/subtree_table.h"
-#include "voxdag/cancel_token.h"
+#include "core/format/verify/checked_level.h"
 
 namespace voxdag {
 
@@ -27,22 +23,12 @@ bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, u
 
 // Checks that the nodes of level `level` + 1 are in the order by first parent. In this order, each
 // pointer in `level` refers to a node to which an earlier pointer refers, or to the node that
-// follows the last of these nodes. `index` is the index of `level`. Throws Error{kCorrupt}.
-void expect_first_parents(const voxdag_reader::File& file, uint32_t level, const NodeIndex& index,
-                          const CancelToken& cancel, PageLimit& pages);
-
-// A level, and a table with the truncated hashes of its nodes.
-struct HashedLevel {
-  const voxdag_reader::File& file;
-  uint32_t level;
-  const NodeIndex& index;
-  const SubtreeTable& table;
-};
+// follows the last of these nodes. `level` is the number of `nodes`. Throws Error{kCorrupt}.
+void expect_first_parents(const VerifyTask& task, const CheckedLevel& nodes);
 
 // Checks that no two nodes of the level are equal. Sorts the nodes by their hashes, one range of
-// hashes after the other, so the memory does not depend on the size of the level. Throws
-// Error{kCorrupt}.
-void expect_unique(const HashedLevel& nodes, unsigned threads, MemoryBudget& budget,
-                   const CancelToken& cancel);
+// hashes after the other, so the memory does not depend on the size of the level. If the level is
+// stored, writes the hashes of all ranges to a scratch file first. Throws Error{kCorrupt}.
+void expect_unique(const VerifyTask& task, const CheckedLevel& nodes);
 
 }  // namespace voxdag

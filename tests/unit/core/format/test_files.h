@@ -53,6 +53,15 @@ inline oracle::Voxels random_voxels(uint64_t seed, int edge) {
   return voxels;
 }
 
+// Returns `count` voxels at random places, some of them equal. Their DAGs have many nodes.
+inline oracle::Voxels noise_voxels(uint64_t seed, int edge, int count) {
+  oracle::Random random(seed);
+  oracle::Voxels voxels(edge);
+  const auto at_random = [&] { return static_cast<int>(random.between(0, edge - 1)); };
+  for (int i = 0; i < count; ++i) voxels.set(at_random(), at_random(), at_random());
+  return voxels;
+}
+
 // Returns the words of the oracle's levels in the layout of the global file, beginning with the
 // bricks. Pointers to a level of more than `narrow_words` words have 64 bits, other pointers 32
 // bits.

@@ -12,9 +12,9 @@
 #include "core/base/progress.h"
 #include "core/base/text.h"
 #include "core/format/global/open_global.h"
-#include "core/format/verify/verify.h"
 #include "query/reorder/reorder.h"
 #include "tests/unit/core/format/test_files.h"
+#include "tests/unit/core/format/verify_both_ways.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
@@ -88,10 +88,7 @@ class Reorder : public testing::Test {
   }
   void verify(const std::string& name, uint64_t narrow_words = global_layout::kNarrowLevelWords,
               bool is_quick = false) {
-    const auto file = open_global_file(path(name));
-    MemoryBudget budget(uint64_t{1} << 30);
-    with_reader_errors(
-        [&] { verify_global_file(*file, 2, budget, progress_, never_, narrow_words, is_quick); });
+    verify_both_ways(*open_global_file(path(name)), {2, narrow_words, is_quick});
   }
   // Expects that the folder contains exactly the files with these names.
   void expect_files(std::vector<std::string> names) const {

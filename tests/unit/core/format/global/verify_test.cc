@@ -12,6 +12,7 @@
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
 #include "tests/unit/core/format/test_files.h"
+#include "tests/unit/core/format/verify_both_ways.h"
 
 namespace voxdag {
 namespace {
@@ -20,14 +21,9 @@ using namespace global_layout;
 using testing::HasSubstr;
 
 void verify(const std::string& path, unsigned threads, uint64_t narrow_words = kNarrowLevelWords) {
-  MemoryBudget budget(uint64_t{1} << 30);
-  NoProgress progress;
-  const CancelToken cancel;
-  const auto file = open_global_file(path);
-  with_reader_errors(
-      [&] { verify_global_file(*file, threads, budget, progress, cancel, narrow_words); });
+  verify_in_memory(*open_global_file(path), {threads, narrow_words});
 }
-void verify(const std::string& path) { verify(path, 3); }
+void verify(const std::string& path) { verify_both_ways(*open_global_file(path)); }
 
 template <class T>
 void put(ByteString& bytes, size_t at, T value) {
@@ -81,7 +77,7 @@ TEST_F(VerifyTest, EveryBitFlipIsCaught) {
   for (size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
     const char flipped = static_cast<char>(bytes[bit / 8] ^ 1 << bit % 8);
     file->write_at(bit / 8, std::as_bytes(std::span(&flipped, 1)));
-    EXPECT_THROW(verify(path_), Error) << "bit " << bit;
+    EXPECT_THROW(verify(path_, 1), Error) << "bit " << bit;
     file->write_at(bit / 8, std::as_bytes(std::span(&bytes[bit / 8], 1)));
   }
   EXPECT_NO_THROW(verify(path_));
@@ -121,11 +117,7 @@ TEST_F(VerifyTest, PagesAreDroppedAboveTheLimit) {
 
 // The error names the damaged block in the middle of a large file.
 TEST_F(VerifyTest, DamagedBlockIsNamed) {
-  oracle::Random random(1);
-  oracle::Voxels noise(128);
-  const auto at_random = [&] { return static_cast<int>(random.between(0, 127)); };
-  for (int i = 0; i < 60000; ++i) noise.set(at_random(), at_random(), at_random());
-  write_global(path_, noise);
+  write_global(path_, noise_voxels(1, 128, 60000));
   ByteString bytes = read_bytes(path_);
   ASSERT_GT(bytes.size(), kPageBytes + 2 * kChecksumBlockBytes);
   bytes[kPageBytes + kChecksumBlockBytes + 100] ^= 1;
@@ -171,9 +163,10 @@ void PrintTo(const BrokenDag& broken, std::ostream* out) { *out << broken.rule; 
 class BrokenDagTest : public VerifyTest, public testing::WithParamInterface<BrokenDag> {};
 
 TEST_P(BrokenDagTest, IsCaughtAndNamed) {
-  oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
-  ASSERT_GT(dag.bricks.size(), 8u);
-  ASSERT_GT(dag.levels[0].size(), 4u);
+  // The bricks need over 10 windows of 64 words, the nodes above them over 5.
+  oracle::Dag dag = oracle::build_dag(noise_voxels(7, 32, 3000), 64);
+  ASSERT_GT(dag.bricks.size(), 640u / 2);
+  ASSERT_EQ(dag.levels[0].size(), 64u);
   GetParam().break_it(dag);
   write_global(path_, dag, grid_of(32));
   const Error error = error_of([&] { verify(path_); });
@@ -241,7 +234,7 @@ TEST_F(VerifyTest, TheCoarsestNodeWithoutAParentIsNamed) {
 // The error names a child pointer whose word offset is in the middle of a node of the next level,
 // or beyond the end of the next level.
 TEST_F(VerifyTest, ChildrenThatBeginNoNodeAreNamed) {
-  const oracle::Dag dag = oracle::build_dag(random_voxels(7, 32), 64);
+  const oracle::Dag dag = oracle::build_dag(noise_voxels(7, 32, 3000), 64);
   for (const uint32_t offset : {1u, 1000000u, 0xffffffffu}) {
     write_global(path_, dag, grid_of(32));
     ByteString bytes = read_bytes(path_);
@@ -284,11 +277,8 @@ TEST_F(VerifyTest, OtherNodeOrdersAreNotRead) {
 // A large file has several defects. The threads verify different parts of the file, but the first
 // defect is reported with any number of threads.
 TEST_F(VerifyTest, TheFirstDefectIsReported) {
+  write_global(path_, noise_voxels(3, 256, 1600000));
   oracle::Random random(3);
-  oracle::Voxels noise(256);
-  const auto at_random = [&] { return static_cast<int>(random.between(0, 255)); };
-  for (int i = 0; i < 1600000; ++i) noise.set(at_random(), at_random(), at_random());
-  write_global(path_, noise);
   const ByteString bytes = read_bytes(path_);
   const auto words_end = static_cast<int64_t>(get<uint64_t>(bytes, kTableOffsetAt));
   for (int round = 0; round < 8; ++round) {
@@ -299,6 +289,8 @@ TEST_F(VerifyTest, TheFirstDefectIsReported) {
     write_bytes(path_, changed);
     const std::string message = error_of([&] { verify(path_, 1); }).message();
     for (int i = 0; i < 3; ++i) EXPECT_EQ(error_of([&] { verify(path_, 4); }).message(), message);
+    const auto file = open_global_file(path_);
+    EXPECT_EQ(error_of([&] { verify_in_windows(*file, {}, 0); }).message(), message);
   }
 }
 
@@ -354,7 +346,10 @@ TEST_P(MutationTest, NeverCrashesAReader) {
         const CancelToken cancel;
         diff_global_files(*file, *whole, 2, budget, cancel);
       }
-      verify(path_, 3, GetParam());
+      if (seed % 16 == 0)
+        verify_both_ways(*file, {3, GetParam()});
+      else
+        verify(path_, 3, GetParam());
       struct {
         bool node(uint32_t, int64_t, int64_t, int64_t, uint64_t) { return true; }
         void brick(int64_t, int64_t, int64_t, uint64_t mask, uint64_t) {

@@ -8,8 +8,8 @@
 #include "core/format/global/diff.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
-#include "core/format/verify/verify.h"
 #include "tests/unit/core/format/test_files.h"
+#include "tests/unit/core/format/verify_both_ways.h"
 
 namespace voxdag {
 namespace {
@@ -28,10 +28,7 @@ class WideFileTest : public testing::Test {
   WideFileTest() { write_global(path_, dag_, grid_of(kEdge), 64, kNarrowWords); }
 
   static void verify(const std::string& path, uint64_t narrow_words = kNarrowWords) {
-    MemoryBudget budget(uint64_t{1} << 30);
-    NoProgress progress;
-    const auto file = open_global_file(path);
-    verify_global_file(*file, 2, budget, progress, {}, narrow_words);
+    verify_both_ways(*open_global_file(path), {2, narrow_words});
   }
   // Replaces the header's bytes at offset `at` by `value`, and corrects the header's checksum.
   // Returns the error of opening or verifying the changed file.
@@ -55,7 +52,7 @@ class WideFileTest : public testing::Test {
   TemporaryFolder folder_;
   uint64_t narrow_words_ = kNarrowWords;
   const std::string path_ = folder_.file("wide.vdag");
-  const oracle::Dag dag_ = oracle::build_dag(random_voxels(9, kEdge), 64);
+  const oracle::Dag dag_ = oracle::build_dag(noise_voxels(9, kEdge, 6000), 64);
 };
 
 TEST_F(WideFileTest, HasTheVoxelsOfTheNarrowFile) {
