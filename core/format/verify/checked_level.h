@@ -9,7 +9,6 @@
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/format/global/node_index.h"
-#include "core/format/global/node_spans.h"
 #include "core/format/global/page_limit.h"
 #include "core/format/global/voxdag_reader.h"
 #include "core/format/verify/span_file.h"

@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "core/format/global/node_spans.h"
+#include "core/format/global/node_index.h"
 #include "core/io/file_system.h"
 #include "core/io/temporary_paths.h"
 

@@ -96,7 +96,7 @@ TEST_F(Reorder, TilesAreEqual) {
 class OrderDefects : public Reorder {
  protected:
   OrderDefects() {
-    write_global(path("a"), noise_voxels(7, 64, 6000));
+    write_global(path("a"), noise_voxels(7, 64, 3000));
     reorder_file("a", spec(NodeOrder::kByFirstParent, "b"));
     const auto file = open_global_file(path("b"));
     levels_ = words_of(*file);

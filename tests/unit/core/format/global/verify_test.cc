@@ -67,6 +67,11 @@ TEST_F(VerifyTest, RightFilesPass) {
     }
   write_global(path_, oracle::Voxels(32));
   EXPECT_NO_THROW(verify(path_));
+  // Several windows of nodes whose cubes have more than 32 voxels per edge.
+  write_global(path_, noise_voxels(1, 256, 200));
+  ASSERT_GT(open_global_file(path_)->level(2).word_count, 3 * 64u);
+  ASSERT_EQ(span_words_of(*open_global_file(path_)), 64u);
+  EXPECT_NO_THROW(verify(path_));
 }
 
 // `verify` detects each single flipped bit of a file of 8^3 voxels.
