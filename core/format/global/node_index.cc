@@ -119,7 +119,7 @@ NodeIndex::NodeIndex(const voxdag_reader::Level& level, Pointers pointers, unsig
 }
 
 NodeIndex::NodeIndex(const NodeSpans& spans, uint64_t first, uint64_t end, unsigned threads,
-                     MemoryBudget& budget)
+                     MemoryBudget& budget, PageLimit& pages)
     : level_(spans.level()), pointers_(spans.pointers()) {
   const uint64_t first_word = first * spans.span_words();
   level_.words += first_word;
@@ -134,6 +134,7 @@ NodeIndex::NodeIndex(const NodeSpans& spans, uint64_t first, uint64_t end, unsig
       at -= first_word;
       words_[at / 64].starts |= uint64_t{1} << at % 64;
     });
+    pages.touch(sizeof(uint32_t) * spans.span_words());
   });
   count_before(end - first, spans.span_words(), threads);
 }

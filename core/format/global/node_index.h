@@ -139,9 +139,9 @@ class NodeIndex {
             PageLimit* pages = nullptr);
   // Makes an index of the spans `first` to `end` - 1 of a level. Only find() and lookup() may be
   // used. Their offsets and indexes count from the first word, and from the first node that begins,
-  // in these spans.
+  // in these spans. Reports to `pages` the bytes that were read.
   NodeIndex(const NodeSpans& spans, uint64_t first, uint64_t end, unsigned threads,
-            MemoryBudget& budget);
+            MemoryBudget& budget, PageLimit& pages);
 
   // Returns the index of the node that begins at `offset`; kNone if no node begins there.
   uint64_t find(uint64_t offset) const { return lookup().find(offset); }

@@ -25,12 +25,13 @@ class PageLimit {
     const uint64_t before = touched_bytes_.fetch_add(bytes, std::memory_order_relaxed);
     if (before / interval_bytes_ != (before + bytes) / interval_bytes_) check();
   }
+  // Drops the pages if the process exceeds its limit now. touch() calls it, so it is only needed
+  // after other memory was filled.
+  void check() const;
   // Returns the sum of the bytes that were passed to touch().
   uint64_t touched_bytes() const { return touched_bytes_; }
 
  private:
-  void check() const;
-
   const voxdag_reader::File& file_;
   const uint64_t limit_bytes_;
   const uint64_t interval_bytes_;

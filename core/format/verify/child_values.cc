@@ -147,7 +147,7 @@ NodeLevel ChildValues::load(uint64_t span, Buffer& buffer) const {
 
 LevelWindow::LevelWindow(const VerifyTask& task, unsigned threads, const CheckedLevel& level,
                          uint64_t first, uint64_t end)
-    : index(level.spans, first, end, threads, task.budget),
+    : index(level.spans, first, end, threads, task.budget, task.pages),
       table(task.budget, level.spans.nodes_before(end) - level.spans.nodes_before(first),
             level.cube_levels) {
   const uint64_t before = level.spans.nodes_before(first);
@@ -156,8 +156,8 @@ LevelWindow::LevelWindow(const VerifyTask& task, unsigned threads, const Checked
     const uint64_t node = level.spans.nodes_before(first + i);
     level.values->read(
         first + i, table.words_of(node - before, level.spans.nodes_before(first + i + 1) - node));
-    task.pages.touch(sizeof(uint32_t) * level.spans.span_words());
   });
+  task.pages.check();
 }
 
 }  // namespace voxdag

@@ -112,6 +112,7 @@ void expect_unique_stored(const VerifyTask& task, const CheckedLevel& nodes, uns
           std::memcpy(static_cast<void*>(&sorted[i][at]), words.data(), words.size_bytes());
       });
     }
+    task.pages.check();
     parallel_for(threads, count, [&](unsigned, size_t i) {
       expect_unique_range(task, nodes.level, {sorted[i].data(), sorted[i].size()});
     });
