@@ -11,11 +11,11 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr int kEdge = 64;
-constexpr uint32_t kBrickLevel = 4;
-
 class VerifyWindows : public testing::Test {
  protected:
+  static constexpr int kEdge = 64;
+  static constexpr uint32_t kBrickLevel = 4;
+
   VerifyWindows() { write_global(path_, dag_, grid_of(kEdge)); }
 
   uint64_t scratch_bytes(uint64_t memory_bytes) const {
