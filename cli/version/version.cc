@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "cli/output.h"
+#include "cli/version/commit.h"
 #include "optional_features.h"
-#include "voxdag_commit.h"
 
 namespace voxdag::cli {
 namespace {
