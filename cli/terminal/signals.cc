@@ -17,13 +17,13 @@
 namespace voxdag::cli {
 namespace {
 
-CancelToken* g_cancel = nullptr;
+CancelToken* g_signal_token = nullptr;
 sem_t g_signaled;
 std::atomic<bool> g_may_stop_slowly{false};
 
 void on_signal(int signal) {
-  if (g_cancel->canceled()) _Exit(128 + signal);
-  g_cancel->cancel();
+  if (g_signal_token->canceled()) _Exit(128 + signal);
+  g_signal_token->cancel();
   const int before = errno;
   sem_post(&g_signaled);
   errno = before;
@@ -53,7 +53,7 @@ void start_thread() {
 }  // namespace
 
 void catch_signals(CancelToken& cancel) {
-  g_cancel = &cancel;
+  g_signal_token = &cancel;
   sem_init(&g_signaled, 0, 0);
   start_thread();
   struct sigaction action {};

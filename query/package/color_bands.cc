@@ -13,7 +13,7 @@ namespace {
 constexpr uint32_t kPageDepth = 3;         // levels from the cube of a page to its cells
 constexpr size_t kColorBlockWords = 4096;  // a block ends with the page that reaches this size
 
-std::array<uint64_t, 3> position_of(uint64_t code) {
+std::array<uint64_t, 3> page_position(uint64_t code) {
   uint32_t x = 0, y = 0, z = 0;
   morton_decode(code, x, y, z);
   return {x, y, z};
@@ -48,7 +48,7 @@ void ColorBands::visit(uint32_t depth, uint64_t content, uint64_t code, ColorPag
 }
 
 void ColorBands::add_page(uint64_t code, ColorPages& encoder) {
-  block_.push_back({code, encoder.encode({level_, position_of(code)})});
+  block_.push_back({code, encoder.encode({level_, page_position(code)})});
   block_words_ += block_.back().words.size();
   ++pages_;
   if (block_words_ >= kColorBlockWords) end_block();

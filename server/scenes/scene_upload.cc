@@ -6,7 +6,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr size_t kBufferBytes = 256 << 10;
+constexpr size_t kUploadBufferBytes = 256 << 10;
 // Maximum bytes that a client must send again after a power cut.
 constexpr uint64_t kCheckpointBytes = uint64_t{64} << 20;
 
@@ -72,7 +72,7 @@ bool SceneUpload::has_part() const {
 
 void SceneUpload::write(std::string_view bytes) {
   buffer_ += bytes;
-  if (buffer_.size() >= kBufferBytes) flush();
+  if (buffer_.size() >= kUploadBufferBytes) flush();
   if (offset_ - recorded_ >= kCheckpointBytes) checkpoint();
 }
 

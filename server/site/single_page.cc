@@ -12,7 +12,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 30;
+constexpr uint64_t kMaxPageFileBytes = uint64_t{1} << 30;
 
 // Writes a text file in several parts. finish() returns the size of the file.
 class TextWriter {
@@ -48,7 +48,7 @@ uint64_t write_page(const std::string& package, const PageContents& contents,
   for (const std::string& name : names) {
     cancel.check();
     out.add("<script type=\"text/plain\" data-file=\"" + name + "\">");
-    out.add(base64_of(read_small_file(files, package + "/" + name, kMaxFileBytes)));
+    out.add(base64_of(read_small_file(files, package + "/" + name, kMaxPageFileBytes)));
     out.add("</script>\n");
   }
   out.add(page.substr(data));

@@ -13,7 +13,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kMaxFileBytes = 16 << 20;
+constexpr uint64_t kMaxCertificateBytes = 16 << 20;
 
 struct Free {
   void operator()(BIO* bio) const { BIO_free(bio); }
@@ -25,7 +25,7 @@ struct Free {
 }  // namespace
 
 void check_certificates(FileSystem& files, const std::string& path) {
-  const std::string text = read_small_file(files, path, kMaxFileBytes);
+  const std::string text = read_small_file(files, path, kMaxCertificateBytes);
   const auto fail = [&](const std::string& what) {
     ERR_clear_error();
     throw Error(ErrorCode::kInvalidInput,

@@ -11,7 +11,7 @@
 namespace voxdag::server {
 namespace {
 
-constexpr uint64_t kMaxFileBytes = uint64_t{1} << 20;
+constexpr uint64_t kMaxTokenFileBytes = uint64_t{1} << 20;
 constexpr size_t kHashDigits = 64;
 
 bool is_name(const std::string& name) {
@@ -36,7 +36,7 @@ std::optional<Role> parse_role(std::string_view name) {
 }
 
 Tokens Tokens::read(FileSystem& files, const std::string& path) {
-  std::istringstream text(read_small_file(files, path, kMaxFileBytes));
+  std::istringstream text(read_small_file(files, path, kMaxTokenFileBytes));
   Tokens tokens;
   std::string line;
   for (int number = 1; std::getline(text, line); ++number) {
