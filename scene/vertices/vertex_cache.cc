@@ -4,6 +4,8 @@
 #include <cstring>
 #include <limits>
 
+#include "core/base/error.h"
+
 namespace voxdag {
 
 VertexCache::VertexCache(MemoryBudget& budget, uint64_t vertices, unsigned caches) {
@@ -66,6 +68,24 @@ void VertexCache::load(uint64_t block, size_t slot) {
   block_in_slot_[slot] = block;
 }
 
+// Reads the blocks [block, end) of the source into untransformed_. If this fails, reads only the
+// first block, because the others can have damaged vertices that no triangle uses. Returns the end
+// of the blocks that were read.
+uint64_t VertexCache::read_blocks(uint64_t block, uint64_t end) {
+  const uint64_t first = block * kBlockVertices;
+  const auto read = [&](uint64_t last) {
+    const uint64_t count = std::min(last * kBlockVertices, source_->count()) - first;
+    source_->read(first, static_cast<size_t>(count), &untransformed_[3 * first]);
+    return last;
+  };
+  try {
+    return read(end);
+  } catch (const Error&) {
+    if (end == block + 1) throw;
+  }
+  return read(block + 1);
+}
+
 // Reads the vertices of a block from the source, untransformed. If all vertices of the source fit
 // in untransformed_, also reads the blocks after it up to a multiple of kBlocksPerRead.
 void VertexCache::read(uint64_t block, std::span<double> out) {
@@ -73,9 +93,7 @@ void VertexCache::read(uint64_t block, std::span<double> out) {
   if (!is_read_[block]) {
     uint64_t end = block + 1;
     while (end < is_read_.size() && end % kBlocksPerRead != 0 && !is_read_[end]) ++end;
-    const uint64_t first = block * kBlockVertices;
-    const uint64_t count = std::min(end * kBlockVertices, source_->count()) - first;
-    source_->read(first, static_cast<size_t>(count), &untransformed_[3 * first]);
+    end = read_blocks(block, end);
     std::fill(is_read_.begin() + static_cast<ptrdiff_t>(block),
               is_read_.begin() + static_cast<ptrdiff_t>(end), true);
   }

@@ -57,6 +57,7 @@ class VertexCache {
   void forget();
   void load(uint64_t block, size_t slot);
   void read(uint64_t block, std::span<double> out);
+  uint64_t read_blocks(uint64_t block, uint64_t end);
 
   PageBuffer<double> positions_;  // transformed and snapped positions of the cached blocks
   // The untransformed vertices of the source, if all of them fit here. Then vertices are not read

@@ -131,6 +131,8 @@ NodeIndex::NodeIndex(const NodeSpans& spans, uint64_t first, uint64_t end, unsig
     words_[i * spans.span_words() / 64].before =
         spans.nodes_before(first + i) - spans.nodes_before(first);
     spans.visit_span(first + i, [&](uint64_t, uint64_t at) {
+      // Only if the file has changed since the spans were made, a node can begin outside its span.
+      if (at / spans.span_words() != first + i) return;
       at -= first_word;
       words_[at / 64].starts |= uint64_t{1} << at % 64;
     });

@@ -93,7 +93,7 @@ class BatchComputer {
     for (uint32_t i = 0; i < batch_.count; ++i) {
       const uint64_t at = batch_.at[i];
       const uint32_t* const words = level_.nodes.words + at;
-      const uint32_t mask = words[0];
+      const uint32_t mask = words[0] & 0xff;  // 1 to 255, unless the file has changed
       const uint32_t count = kPopcount8[mask];
       masks_[i] = static_cast<uint8_t>(mask);
       first_[i] = filled;

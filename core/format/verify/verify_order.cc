@@ -107,7 +107,11 @@ void expect_unique_stored(const VerifyTask& task, const CheckedLevel& nodes, uns
       parallel_for(threads, spans, [&](unsigned worker, size_t span) {
         task.cancel.check();
         const auto words = lists.next(span, first + i, buffers[worker]);
-        const uint64_t at = filled.fetch_add(words.size_bytes() / sizeof(HashedNode));
+        const uint64_t added = words.size_bytes() / sizeof(HashedNode);
+        const uint64_t at = filled.fetch_add(added);
+        if (at + added > sorted[i].size())
+          throw Error(ErrorCode::kCorrupt, place_in(task.file, nodes.level, 0) +
+                                               "the level has changed: expected the same nodes");
         if (!words.empty())
           std::memcpy(static_cast<void*>(&sorted[i][at]), words.data(), words.size_bytes());
       });
@@ -126,7 +130,7 @@ bool is_node_less(const voxdag_reader::File& file, uint32_t level, uint64_t a, u
   const voxdag_reader::Node left = verified_node(file, level, a);
   const voxdag_reader::Node right = verified_node(file, level, b);
   if (left.child_mask != right.child_mask) return left.child_mask < right.child_mask;
-  for (int c = 0; c < kPopcount8[left.child_mask]; ++c)
+  for (int c = 0; c < popcount8(left.child_mask); ++c)
     if (left.child(c) != right.child(c)) return left.child(c) < right.child(c);
   return false;
 }
@@ -145,10 +149,11 @@ void expect_first_parents(const VerifyTask& task, const CheckedLevel& nodes) {
                       ", but no pointer before it leads to the node at word " +
                       std::to_string(next) +
                       ": expected the order by first parent (docs/format.md)");
-    if (child < next) return;
+    // Only if the file has changed, a pointer can lead to the end of the level here.
+    if (child < next || child >= file.level(level + 1).word_count) return;
     const auto children = [&] {
       const voxdag_reader::Node below = verified_node(file, level + 1, next);
-      return static_cast<uint64_t>(kPopcount8[below.child_mask]) << below.wide;
+      return static_cast<uint64_t>(popcount8(below.child_mask)) << below.wide;
     };
     next += has_bricks ? 2 : 1 + children();
   };
@@ -157,7 +162,7 @@ void expect_first_parents(const VerifyTask& task, const CheckedLevel& nodes) {
     const uint64_t first = next;
     nodes.visit_span(span, [&](uint64_t, uint64_t at) {
       const voxdag_reader::Node node = verified_node(file, level, at);
-      for (int c = 0; c < kPopcount8[node.child_mask]; ++c) pass(at, node, c);
+      for (int c = 0; c < popcount8(node.child_mask); ++c) pass(at, node, c);
     });
     task.pages.touch(sizeof(uint32_t) * (NodeIndex::kSpanWords + next - first));
   }

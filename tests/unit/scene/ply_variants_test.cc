@@ -262,5 +262,18 @@ TEST(PlyVariants, NumbersAsTextOfOtherPrograms) {
         << word;
 }
 
+// Vertices are read in blocks of 1024, several at once. A damaged vertex that no triangle uses does
+// not matter, unless it is in the block of a used vertex.
+TEST(PlyVariants, DamagedVerticesFarFromUsedOnes) {
+  const std::string header = replaced(ascii_header(kListLine), "vertex 3", "vertex 9000");
+  const auto scene = [&](int damaged) {
+    std::string rows = "0 0 0\n1 0 0\n0 1 0\n";
+    for (int i = 3; i < 9000; ++i) rows += i == damaged ? "0 0 bad\n" : "0 0 0\n";
+    return header + rows + "3 0 1 2\n";
+  };
+  EXPECT_EQ(triangles_of_file(scene(5000)), kOnlyLower);
+  EXPECT_NE(error_of_file(scene(1000)).message().find("vertex 1000 has bad"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace voxdag::test

@@ -163,8 +163,13 @@ export class PackageSource {
       if (error) request.reject(error);
       return {...request, ...value, error};
     }));
-    const known = places.filter(({error}) => !error), reads = this.segments.read(known, options);
-    known.forEach((place, i) => place.resolve(this.decodeRead(place, reads[i], options)));
+    const known = places.filter(({error}) => !error);
+    try {
+      const reads = this.segments.read(known, options);
+      known.forEach((place, i) => place.resolve(this.decodeRead(place, reads[i], options)));
+    } catch (error) {
+      for (const place of known) place.reject(error);
+    }
   }
 
   // Decodes the bytes of a place. If they are damaged and no answer to a range request was correct

@@ -2,6 +2,8 @@
 // and the tests of `reorder` compare the results with those of the verification in memory.
 #include <gmock/gmock.h>
 
+#include "core/format/global/node_index.h"
+#include "core/format/global/page_limit.h"
 #include "tests/support/faulty_files.h"
 #include "tests/unit/core/format/test_files.h"
 #include "tests/unit/core/format/verify_both_ways.h"
@@ -137,6 +139,25 @@ TEST_F(VerifyWindows, Cancel) {
     ++canceled;
   }
   EXPECT_GT(canceled, 8u);
+}
+
+// Another program makes the nodes of a level longer after the level was divided into spans. The
+// index of a window then only has nodes that begin in their spans.
+TEST_F(VerifyWindows, ALevelThatChanges) {
+  constexpr uint64_t kSpanWords = 64;
+  std::vector<uint32_t> words(64 * kSpanWords, 1);  // nodes with one child
+  voxdag_reader::Level level;
+  level.words = words.data();
+  level.word_count = words.size();
+  level.node_count = words.size() / 2;
+  const auto file = open_global_file(path_);
+  PageLimit pages(*file, UINT64_MAX);
+  MemoryBudget budget(UINT64_MAX);
+  const NodeSpans spans(level, Pointers::kNarrow, 1, budget, {}, "level", &pages, kSpanWords);
+  std::fill(words.begin(), words.end(), 255);  // nodes of nine words
+  const NodeIndex window(spans, 0, 2, 1, budget, pages);
+  for (uint64_t at = 0; at < 2 * kSpanWords; ++at)
+    EXPECT_EQ(window.find(at) != NodeIndex::kNone, at % kSpanWords % 9 == 0) << at;
 }
 
 }  // namespace
