@@ -83,6 +83,7 @@ void ChildValues::list_pointers(SpanLists& lists) {
       });
     });
     values_->reserve(span, pointers * node_words_);
+    task_.progress.advance(parents_.nodes_before(span + 1) - parents_.nodes_before(span));
     task_.pages.touch(sizeof(uint32_t) * parents_.span_words());
   });
 }
@@ -92,11 +93,13 @@ void ChildValues::find_values(SpanLists& lists, uint64_t window) {
   const uint64_t first = window * step;
   LevelWindow loaded(task_, threads_, children_, first,
                      std::min(first + step, children_.spans.size()));
+  const uint64_t nodes = loaded.table.size(), spans = parents_.size();
   std::vector<Buffer> buffers(threads_);
-  parallel_for(threads_, parents_.size(), [&](unsigned worker, size_t span) {
+  parallel_for(threads_, spans, [&](unsigned worker, size_t span) {
     task_.cancel.check();
     Buffer& buffer = buffers[worker];
     append_values(span, lists.next(span, window, buffer.lists), loaded, buffer);
+    task_.progress.advance(nodes * (span + 1) / spans - nodes * span / spans);
   });
   if (first_orphan_ != NodeIndex::kNone) return;
   if (const uint64_t orphan = voxdag::first_orphan(task_, loaded.table); orphan != NodeIndex::kNone)

@@ -34,6 +34,7 @@ class ChildValues {
 
   // Finds the values of all children. `parents` are the spans of the level above `children`. A
   // window takes about `window_bytes`, but at least one span. The objects must outlive this one.
+  // Reports progress of as many nodes as both levels have.
   ChildValues(const VerifyTask& task, const NodeSpans& parents, const CheckedLevel& children,
               uint64_t window_bytes);
 

@@ -26,7 +26,10 @@ constexpr uint64_t kNodesPerItem = uint64_t{1} << 16;
 class NodeVerifier {
  public:
   explicit NodeVerifier(const VerifyTask& task)
-      : task_(task), file_(task.file), orphans_(file_.brick_level() + 1, NodeIndex::kNone) {}
+      : task_(task),
+        file_(task.file),
+        total_(file_.dag_nodes()),
+        orphans_(file_.brick_level() + 1, NodeIndex::kNone) {}
 
   // Returns the values of the root.
   Subtree check_levels();
@@ -64,7 +67,10 @@ class NodeVerifier {
   const VerifyTask& task_;
   const voxdag_reader::File& file_;
   const ComputeBatch compute_batch_ = compute_batch();
-  CheckedLevel below_;             // the level checked last
+  CheckedLevel below_;  // the level checked last
+  // Total of the progress: all nodes once, and the nodes of two levels again if the lower level is
+  // stored.
+  uint64_t total_;
   std::vector<uint64_t> orphans_;  // index of each level's first node without a parent, or kNone
 };
 
@@ -260,6 +266,8 @@ void NodeVerifier::check_level(uint32_t level) {
   CheckedLevel checked = index_level(level);
   uint64_t orphan = NodeIndex::kNone;
   if (below_.is_stored()) {
+    task_.progress.set_total(total_ +=
+                             file_.level(level).node_count + file_.level(level + 1).node_count);
     const ChildValues children(task_, checked.spans, below_, task_.free_memory() / 4 * 3);
     orphan = children.first_orphan();
     check_stored(checked, &children);
@@ -280,7 +288,7 @@ void NodeVerifier::check_level(uint32_t level) {
 }
 
 Subtree NodeVerifier::check_levels() {
-  task_.progress.begin_stage("verify nodes", file_.dag_nodes(), "nodes");
+  task_.progress.begin_stage("verify nodes", total_, "nodes");
   for (uint32_t level = file_.brick_level() + 1; level-- > 0;) check_level(level);
   if (file_.level(0).node_count != 1)
     broken(where(0), std::to_string(file_.level(0).node_count) + " roots, expected 1");

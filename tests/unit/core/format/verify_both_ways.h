@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <filesystem>
 #include <optional>
@@ -51,8 +52,19 @@ inline uint64_t verify_in_windows(const voxdag_reader::File& file, const VerifyC
   // The scratch files have no names, so a killed process leaves none.
   struct NoNames : NoProgress {
     explicit NoNames(std::string path) : folder(std::move(path)) {}
-    void advance(uint64_t) override { EXPECT_TRUE(std::filesystem::is_empty(folder)); }
+    void begin_stage(std::string_view, uint64_t units, std::string_view) override {
+      total = units;
+      done = 0;
+    }
+    void set_total(uint64_t units) override { total = units; }
+    void advance(uint64_t units) override {
+      EXPECT_TRUE(std::filesystem::is_empty(folder));
+      done += units;
+    }
+    void end_stage() override { EXPECT_EQ(done, total); }
     const std::string folder;
+    uint64_t total = 0;
+    std::atomic<uint64_t> done{0};
   } progress(folder.path());
   const auto expect_no_files = [&] {
     EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
