@@ -8,6 +8,7 @@ import {tileShape} from "../tiles/tile_format.js";
 
 import {decodeColorBlock, gunzip, mortonCode, TileBlock} from "./block_format.js";
 import {Directory} from "./directory.js";
+import {PromiseCache} from "./promise_cache.js";
 import {Segments} from "./segments.js";
 
 const kFormat = "voxdag package", kVersions = [1, 2];
@@ -37,8 +38,7 @@ export class PackageSource {
       message:
           "Part of the files is missing or damaged and drawn coarse: run voxdag publish --check."
     };
-    this.blocks = new Map();  // block -> promise of the decoded block, in order of use
-    this.cachedBytes = 0;
+    this.blocks = new PromiseCache(kMaxCachedBytes);  // decoded blocks
     this.lookedMs = -Infinity;
     this.looking = null;
   }
@@ -145,19 +145,15 @@ export class PackageSource {
         return new TileError(200, damage.message);
       }
     });
-    this.evict();
+    this.blocks.evict();
     return answers;
   }
 
   // Begins to load the blocks of the list `blocks` that are not in this.blocks.
   async load(blocks, options) {
     const wanted = [];
-    for (const block of blocks) {
-      const known = this.blocks.get(block);
-      this.blocks.delete(block);
-      if (known) this.blocks.set(block, known);
-      else wanted.push(this.begin(block));
-    }
+    for (const block of blocks)
+      if (!this.blocks.get(block)) wanted.push(this.begin(block));
     const places = await Promise.all(wanted.map(async (request) => {
       const {value, error} = await outcomeOf(this.directory.place(request.block, options));
       if (error) request.reject(error);
@@ -192,10 +188,7 @@ export class PackageSource {
   begin(block) {
     const request = {block};
     const loads = new Promise((resolve, reject) => Object.assign(request, {resolve, reject}));
-    this.blocks.set(block, loads);
-    loads.then((decoded) => loads.byteSize = decoded.byteSize, () => {
-      if (this.blocks.get(block) === loads) this.blocks.delete(block);
-    });
+    this.blocks.add(block, loads, ({byteSize}) => byteSize);
     return request;
   }
 
@@ -204,7 +197,6 @@ export class PackageSource {
       const plain = await gunzip(bytes), decoded = this.parse(block, plain);
       if (bytes.isRange) this.files.rangesAreProven = true;
       decoded.byteSize = plain.length;
-      this.cachedBytes += plain.length;
       return decoded;
     } catch (error) {
       throw new TileError(200, `Block ${block} of the package is damaged: ${error.message}`);
@@ -216,17 +208,6 @@ export class PackageSource {
     if (tiles === undefined) return decodeColorBlock(plain);
     const count = Math.min(kBlockTiles, tiles - index * kBlockTiles);
     return new TileBlock(plain, level, tileShape(this.info, level), count);
-  }
-
-  // Removes the least recently used blocks from this.blocks until the remaining blocks have at most
-  // kMaxCachedBytes. Keeps blocks that are still loading, because their size is unknown.
-  evict() {
-    for (const [block, loads] of this.blocks) {
-      if (this.cachedBytes <= kMaxCachedBytes) return;
-      if (!loads.byteSize) continue;
-      this.blocks.delete(block);
-      this.cachedBytes -= loads.byteSize;
-    }
   }
 
   // Called after a file was not found. Checks whether the package still exists, and sets `ended` if

@@ -2,6 +2,8 @@
 // pack, but the view does not need all of them at the same time. So the segments of the first
 // blocks usually contain later blocks too, which need no further requests.
 
+import {PromiseCache} from "./promise_cache.js";
+
 const kSegmentBytes = 32 * 1024;
 const kMaxGap = 4;               // maximum number of unneeded segments between two of one request
 const kMaxRequestSegments = 32;  // maximum number of segments of one request
@@ -11,10 +13,9 @@ export class Segments {
   // `files` is a PackageFiles, or an object with the same functions.
   constructor(files) {
     this.files = files;
-    // Segments from range requests, also those that are still loading: key -> promise of the bytes,
-    // in order of use. Complete files are not kept here, because PackageFiles keeps them.
-    this.loaded = new Map();
-    this.cachedBytes = 0;
+    // Segments that are loading or are from range requests. Complete files are not kept here,
+    // because PackageFiles keeps them.
+    this.loaded = new PromiseCache(kMaxCachedBytes);
   }
 
   // Begins to read the `places`, {file, offset, bytes}. Returns a promise of the bytes of each
@@ -23,21 +24,18 @@ export class Segments {
   read(places, options) {
     if (options.cache === "reload") places.forEach((place) => this.forget(place));
     const missing = new Map();
-    for (const segment of places.flatMap(segmentsOf)) {
-      const known = this.loaded.get(segment.key);
-      if (!known) missing.set(segment.key, segment);
-      else this.keep(segment.key, known);
-    }
+    for (const segment of places.flatMap(segmentsOf))
+      if (!this.loaded.get(segment.key)) missing.set(segment.key, segment);
     for (const run of this.runsOf([...missing.values()])) this.fetch(run, options);
     const reads = places.map(
         (place) => joined(place, segmentsOf(place).map(({key}) => this.loaded.get(key))));
-    this.evict();
+    this.loaded.evict();
     return reads;
   }
 
   // Removes the segments of a place.
   forget(place) {
-    for (const {key} of segmentsOf(place)) this.remove(key);
+    for (const {key} of segmentsOf(place)) this.loaded.delete(key);
   }
 
   // Fetches the segments first to last of a file with one request.
@@ -45,15 +43,10 @@ export class Segments {
     const begin = first * kSegmentBytes, end = Math.min(file.bytes, (last + 1) * kSegmentBytes);
     const reads = this.files.read(file, begin, end - begin, options);
     for (let index = first; index <= last; ++index) {
-      const key = keyOf(file, index), at = (index - first) * kSegmentBytes;
-      const loads = reads.then((bytes) => partOf(bytes, at));
-      this.loaded.set(key, loads);
-      loads.then(({length, isRange}) => {
-        if (this.loaded.get(key) !== loads) return;
-        if (!isRange) return this.loaded.delete(key);
-        loads.byteSize = length;
-        this.cachedBytes += length;
-      }, () => this.loaded.get(key) === loads && this.loaded.delete(key));
+      const at = (index - first) * kSegmentBytes;
+      this.loaded.add(
+          keyOf(file, index), reads.then((bytes) => partOf(bytes, at)),
+          ({length, isRange}) => isRange ? length : 0);
     }
   }
 
@@ -78,26 +71,6 @@ export class Segments {
     for (let index = begin; index < end; ++index)
       if (this.loaded.has(keyOf(file, index))) return false;
     return true;
-  }
-
-  // Makes a segment the most recently used one.
-  keep(key, loads) {
-    this.loaded.delete(key);
-    this.loaded.set(key, loads);
-  }
-
-  remove(key) {
-    this.cachedBytes -= this.loaded.get(key)?.byteSize ?? 0;
-    this.loaded.delete(key);
-  }
-
-  // Removes the least recently used segments until the remaining segments have at most
-  // kMaxCachedBytes. Keeps segments that are still loading, because their size is unknown.
-  evict() {
-    for (const [key, {byteSize}] of this.loaded) {
-      if (this.cachedBytes <= kMaxCachedBytes) return;
-      if (byteSize) this.remove(key);
-    }
   }
 }
 
