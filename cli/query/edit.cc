@@ -14,10 +14,10 @@
 #include "cli/terminal/progress_bar.h"
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
+#include "core/io/outputs/temporary_work.h"
 #include "core/io/overwrite.h"
 #include "query/combine/combine.h"
 #include "query/dag/locked_outputs.h"
-#include "query/dag/temporary_work.h"
 #include "scene/formats/formats.h"
 #include "scheduler/run_build.h"
 
@@ -194,7 +194,7 @@ class Edit {
   CommandContext& context_;
   FileSystem& files_;
   const std::unique_ptr<Progress> progress_;
-  const query::TemporaryWork folder_;
+  const TemporaryWork folder_;
   const std::vector<query::Shape> shapes_;
   const std::vector<Part>& parts_;
   query::CombineSpec spec_;

@@ -14,6 +14,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/geometry/cube.h"
+#include "core/io/outputs/temporary_work.h"
 #include "query/attributes/color_levels.h"
 #include "query/attributes/combined_section.h"
 #include "query/combine/count_levels.h"
@@ -24,7 +25,6 @@
 #include "query/dag/locked_outputs.h"
 #include "query/dag/publish_file.h"
 #include "query/dag/refuse_order.h"
-#include "query/dag/temporary_work.h"
 
 namespace voxdag::query {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/io/file_system.h"
 #include "core/io/output_lock.h"
-#include "query/dag/temporary_work.h"
+#include "core/io/outputs/temporary_work.h"
 #include "query/package/package_index.h"
 
 namespace voxdag::query {

@@ -4,8 +4,8 @@
 
 #include "core/base/error.h"
 #include "core/base/text.h"
+#include "core/io/outputs/temporary_work.h"
 #include "query/dag/locked_outputs.h"
-#include "query/dag/temporary_work.h"
 #include "query/package/package_reader.h"
 #include "server/site/base64.h"
 
@@ -63,7 +63,7 @@ query::PackageReport write_single_page(const voxdag_reader::File& file, query::P
                                        const CancelToken& cancel) {
   const std::string output = spec.output, partial = output + ".partial";
   query::LockedOutputs outputs(files, {{output}, {file.path()}, replace});
-  const query::TemporaryWork work(files, output + ".work-");
+  const TemporaryWork work(files, output + ".work-");
   const PageContents contents = make_contents();
   spec.output = work.path() + "/package";
   query::PackageReport report = query::write_package(file, spec, {}, files, progress, cancel);

@@ -19,7 +19,7 @@ constexpr int kConvincingNodes = 32;
 uint64_t NodeSpans::words_of_node(uint64_t at) const {
   const uint32_t mask = level_.words[at];
   if (mask == 0 || mask > 255) return 0;
-  return 1 + (uint64_t{kPopcount8[mask]} << (pointers_ == Pointers::kWide));
+  return 1 + (uint64_t{kPopcount8[mask]} << is_wide());
 }
 
 // Returns the first word of the span at which a node seems to begin.

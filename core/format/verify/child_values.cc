@@ -133,8 +133,8 @@ void ChildValues::append_values(uint64_t span, std::span<const uint32_t> pointer
 NodeLevel ChildValues::load(uint64_t span, Buffer& buffer) const {
   buffer.values.resize(values_->words(span));
   values_->read(span, buffer.values);
-  // Counts the pointers into each window. A window's first value follows those of the windows
-  // before it.
+  // Counts the pointers into each window. A window's first value follows the last value of
+  // the window before it.
   buffer.next.assign(slots_.windows, 0);
   visit_pointers(span, [&](uint64_t pointer) { ++buffer.next[slots_.window_of(pointer)]; });
   uint32_t before = 0;

@@ -93,9 +93,15 @@ class SpanLists {
     file_.append(span, buffer.words);
     return items;
   }
+  // Returns the number of items in a list that write() has just laid out in `buffer`.
+  uint64_t items(const Buffer& buffer, uint64_t bucket) const {
+    const uint64_t begin = bucket == 0 ? 0 : buffer.end[bucket - 1] + 1;
+    return (buffer.end[bucket] - begin) / item_words_;
+  }
   // Returns the words of the span's items in the bucket. The buckets must be read in order, from 0.
   // The result is valid while `buffer` is unchanged.
   std::span<const uint32_t> next(uint64_t span, uint64_t bucket, Buffer& buffer);
+  [[noreturn]] void damaged(uint64_t span) const { file_.damaged(span); }
 
  private:
   struct Cursor {

@@ -23,6 +23,7 @@ using namespace global_layout;
 namespace {
 
 constexpr uint64_t kNodesPerItem = uint64_t{1} << 16;
+
 class NodeVerifier {
  public:
   explicit NodeVerifier(const VerifyTask& task)

@@ -21,6 +21,7 @@ namespace {
 constexpr uint64_t kMinRangeBytes = uint64_t{64} << 10;
 constexpr uint64_t kMaxRangeBytes = uint64_t{64} << 20;
 constexpr std::string_view kSortBuffer = "hashes of a level";
+
 struct HashedNode {
   uint64_t hash = 0;
   uint64_t at = 0;  // word offset at which it begins
@@ -93,8 +94,8 @@ void expect_unique_stored(const VerifyTask& task, const CheckedLevel& nodes, uns
         add(range_of(node.hash, bits), words);
       });
     });
-    nodes.visit_span(
-        span, [&](uint64_t i, uint64_t) { ++counts[range_of(table.hash(i - first), bits)]; });
+    for (uint64_t range = 0; range < ranges; ++range)
+      counts[range] += lists.items(buffers[worker], range);
     task.pages.touch(sizeof(uint32_t) * nodes.spans.span_words());
   });
   std::vector<PageBuffer<HashedNode>> sorted(threads);
@@ -109,9 +110,7 @@ void expect_unique_stored(const VerifyTask& task, const CheckedLevel& nodes, uns
         const auto words = lists.next(span, first + i, buffers[worker]);
         const uint64_t added = words.size_bytes() / sizeof(HashedNode);
         const uint64_t at = filled.fetch_add(added);
-        if (at + added > sorted[i].size())
-          throw Error(ErrorCode::kCorrupt, place_in(task.file, nodes.level, 0) +
-                                               "the level has changed: expected the same nodes");
+        if (at + added > sorted[i].size()) lists.damaged(span);
         if (!words.empty())
           std::memcpy(static_cast<void*>(&sorted[i][at]), words.data(), words.size_bytes());
       });

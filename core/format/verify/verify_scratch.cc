@@ -5,6 +5,19 @@
 #include "core/base/text.h"
 
 namespace voxdag {
+namespace {
+
+TemporaryWork make_folder(VerifyScratch& scratch) {
+  try {
+    return {scratch.files(), scratch.prefix()};
+  } catch (const Error& error) {
+    throw Error(error.code(), error.message() + ": expected a folder for temporary files (" +
+                                  option_text("work") + "), or a memory budget that needs none (" +
+                                  option_text("memory") + ")");
+  }
+}
+
+}  // namespace
 
 void VerifyScratch::require_space(uint64_t bytes, const std::string& what) const {
   const std::string folder = parent_directory(prefix_);
@@ -19,34 +32,10 @@ void VerifyScratch::require_space(uint64_t bytes, const std::string& what) const
 
 UnnamedFile::UnnamedFile(VerifyScratch& scratch)
     : scratch_(scratch),
-      folder_(scratch),
+      folder_(make_folder(scratch)),
       out_(scratch.files().create(folder_.path() + "/tables")),
       in_(scratch.files().open_own(folder_.path() + "/tables")) {
   folder_.remove();
-}
-
-UnnamedFile::Folder::Folder(VerifyScratch& scratch)
-    : files_(scratch.files()),
-      path_([&] {
-        try {
-          return make_temporary_folder(scratch.prefix());
-        } catch (const Error& error) {
-          throw Error(error.code(), error.message() + ": expected a folder for temporary files (" +
-                                        option_text("work") +
-                                        "), or a memory budget that needs none (" +
-                                        option_text("memory") + ")");
-        }
-      }()),
-      registered_(std::make_unique<TemporaryPath>(path_)) {}
-
-void UnnamedFile::Folder::remove() {
-  if (!registered_) return;
-  try {
-    remove_tree(files_, path_);
-    registered_.reset();
-  } catch (const Error&) {
-    // This error is ignored, because the destructor tries again.
-  }
 }
 
 }  // namespace voxdag

@@ -12,7 +12,7 @@
 
 #include "core/format/global/node_index.h"
 #include "core/io/file_system.h"
-#include "core/io/temporary_paths.h"
+#include "core/io/outputs/temporary_work.h"
 
 namespace voxdag {
 
@@ -56,25 +56,8 @@ class UnnamedFile {
   void read_at(uint64_t offset, std::span<std::byte> bytes) const { in_->read_at(offset, bytes); }
 
  private:
-  // A folder that exists until the file has no name.
-  class Folder {
-   public:
-    explicit Folder(VerifyScratch& scratch);
-    ~Folder() { remove(); }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    const std::string& path() const { return path_; }
-    // Removes the folder and the file. Ignores errors.
-    void remove();
-
-   private:
-    FileSystem& files_;
-    const std::string path_;
-    std::unique_ptr<TemporaryPath> registered_;  // null after the folder was removed
-  };
-
   VerifyScratch& scratch_;
-  Folder folder_;  // is destroyed after the file was closed
+  TemporaryWork folder_;  // exists until the file has no name; is destroyed after the file
   std::unique_ptr<WritableFile> out_;
   std::unique_ptr<ReadableFile> in_;
 };

@@ -1,13 +1,14 @@
 // A folder for temporary files next to an output.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/base/error.h"
 #include "core/io/file_system.h"
 #include "core/io/temporary_paths.h"
 
-namespace voxdag::query {
+namespace voxdag {
 
 // Creates a folder whose name is `prefix` and random characters. The destructor removes the folder
 // with its contents. If a signal ends the process earlier, remove_temporary_paths()
@@ -16,21 +17,25 @@ class TemporaryWork {
  public:
   TemporaryWork(FileSystem& files, const std::string& prefix)
       : files_(files), path_(make_temporary_folder(prefix)), registered_(path_) {}
-  ~TemporaryWork() {
-    try {
-      remove_tree(files_, path_);
-    } catch (const Error&) {
-      // This error is ignored, because the remaining files are harmless.
-    }
-  }
+  ~TemporaryWork() { remove(); }
   TemporaryWork(const TemporaryWork&) = delete;
   TemporaryWork& operator=(const TemporaryWork&) = delete;
   const std::string& path() const { return path_; }
+  // Removes the folder with its contents now. Ignores errors, because the remaining files are
+  // harmless; the destructor then tries again.
+  void remove() {
+    if (!registered_) return;
+    try {
+      remove_tree(files_, path_);
+      registered_.reset();
+    } catch (const Error&) {
+    }
+  }
 
  private:
   FileSystem& files_;
   const std::string path_;
-  const TemporaryPath registered_;
+  std::optional<TemporaryPath> registered_;  // nullopt after the folder was removed
 };
 
-}  // namespace voxdag::query
+}  // namespace voxdag
