@@ -7,8 +7,8 @@
 # them):
 #     docker build --build-arg BUILD_BASE=nvidia/cuda:12.6.3-devel-ubuntu24.04 \
 #                  --build-arg RUN_BASE=nvidia/cuda:12.6.3-base-ubuntu24.04 -t voxdag:cuda .
-# Both base images must have the same distribution. `tools/check-image` builds and tests this file
-# without a registry, on a base image made by debootstrap.
+# Both base images must have the same distribution. Without docker and a registry, `tools/release image`
+# builds this file on a base image made by debootstrap; `tools/check-image` tests the image.
 ARG BUILD_BASE=debian:bookworm-slim@sha256:3783cc01769c7b2b1b83a5c5ad96c815348e28ed7da68e2e3687004faa906251
 ARG RUN_BASE=debian:bookworm-slim@sha256:3783cc01769c7b2b1b83a5c5ad96c815348e28ed7da68e2e3687004faa906251
 
