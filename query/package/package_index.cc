@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "voxdag package";
+constexpr size_t kDigestDigits = 32;
 constexpr uint64_t kVersion = 2;  // version 1 has no head
 // Maximum depth of nested values in package.json. Formatting nested JSON recurses, so a greater
 // depth could overflow the stack.
@@ -205,6 +206,14 @@ std::string index_text(const PackageIndex& index) {
 
 PackageIndex parse_index(std::string_view text, const std::string& path) {
   return Parser(path).parse(text);
+}
+
+std::string package_digest(const PackageIndex& index) {
+  auto manifest = parse_json<Json>(index.manifest);
+  manifest["digest"] = "";
+  std::string text = exact_json_text(manifest) + index.head.name + index.directory.name;
+  for (const PackageFile& pack : index.packs) text += pack.name;
+  return sha256_hex(text).substr(0, kDigestDigits);
 }
 
 std::string hash_digits(uint64_t hash) {

@@ -92,6 +92,10 @@ std::string index_text(const PackageIndex& index);
 // Error messages begin with `path`.
 PackageIndex parse_index(std::string_view text, const std::string& path);
 
+// Returns the digest of a package: 32 hex digits of the SHA-256 of its manifest, with "" as the
+// digest, and of the names of the head, the directory and the packs, which contain hashes.
+std::string package_digest(const PackageIndex& index);
+
 // Returns a hash as 16 hex digits.
 std::string hash_digits(uint64_t hash);
 // Returns the file name `stem`-HASH`suffix`. HASH is the XXH64 of `contents`, as 16 hex digits.

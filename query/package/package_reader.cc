@@ -370,6 +370,16 @@ void PackageReader::check_page() const {
                         " of the viewer: expected the page that was published with this package");
 }
 
+void PackageReader::check_digest() const {
+  const auto manifest = parse_json<nlohmann::json>(index_.manifest);
+  const auto digest = manifest.value("digest", nlohmann::json());
+  const std::string expected = package_digest(index_);
+  if (digest != expected)
+    corrupt(path_of(kIndexName), "'digest' of the manifest is " + exact_json_text(digest) +
+                                     ": expected \"" + expected +
+                                     "\", the digest of the manifest and of the file names");
+}
+
 void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
   progress.begin_stage("check", blocks_ + index_.head.lengths.size(), "blocks");
   check_file(index_.directory, cancel);
@@ -400,6 +410,7 @@ void PackageReader::check(Progress& progress, const CancelToken& cancel) const {
   if (has_tiles && expected != 0)
     corrupt(path_of(kIndexName), "the finest tiles refer to " + std::to_string(expected) +
                                      " tiles of another band: expected the band with these tiles");
+  check_digest();
   progress.end_stage();
 }
 

@@ -76,6 +76,8 @@ class PackageReader {
   std::string name_of(const PlacedBand& band, uint64_t i) const;
   void check_file(const PackageFile& file, const CancelToken& cancel) const;
   void check_page() const;
+  // Checks that the digest in the manifest is package_digest().
+  void check_digest() const;
   uint64_t check_tiles(const PlacedBand& band, uint64_t head_tiles_below, Progress& progress,
                        const CancelToken& cancel) const;
   void check_colors(const PlacedBand& band, Progress& progress, const CancelToken& cancel) const;

@@ -24,7 +24,6 @@
 namespace voxdag::query {
 namespace {
 
-constexpr size_t kDigestDigits = 32;
 constexpr uint64_t kWindowBlocks = 64;  // blocks that are encoded concurrently
 constexpr uint64_t kRootsShare = 16;    // a list of roots may use 1/16 of the memory
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
@@ -192,21 +191,14 @@ void write_file(FileSystem& files, const std::string& path, std::string_view con
   out->close();
 }
 
-// Returns the digest of a package. It depends on the manifest and, through the hashes in the file
-// names, on the head, the directory and all packs.
-std::string digest_of(const PackageIndex& index) {
-  std::string text = index.manifest + index.head.name + index.directory.name;
-  for (const PackageFile& pack : index.packs) text += pack.name;
-  return sha256_hex(text).substr(0, kDigestDigits);
-}
-
 // Sets the manifest of the index: spec.manifest with the digest added and, if no colors were
 // written, with the member "colors" removed.
 void complete_manifest(const PackageSpec& spec, PackageIndex& index) {
-  index.manifest = spec.manifest;
   auto manifest = parse_json<nlohmann::ordered_json>(spec.manifest);
-  manifest["digest"] = digest_of(index);
   if (!spec.colors) manifest.erase("colors");
+  manifest["digest"] = "";
+  index.manifest = exact_json_text(manifest);
+  manifest["digest"] = package_digest(index);
   index.manifest = exact_json_text(manifest);
 }
 

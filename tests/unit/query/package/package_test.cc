@@ -79,6 +79,7 @@ TEST_F(Package, HasTheColorsOfTheFile) {
     EXPECT_EQ(write(*file, gray).color_pages, 0u);
     EXPECT_EQ(PackageReader(system_files(), gray.output).index().manifest.find("colors"),
               std::string::npos);
+    check("gray" + std::to_string(color_levels));
   }
 }
 
@@ -138,6 +139,23 @@ TEST_F(Package, NamesDamage) {
     EXPECT_THAT(check_error("p"), testing::HasSubstr(file));
     write_bytes(file, intact);
   }
+  check("p");
+}
+
+// A viewer shows the manifest, but only the digest tells whether it belongs to the files.
+TEST_F(Package, NamesAnotherDigest) {
+  write_random("p");
+  const nlohmann::ordered_json intact = read_index("p");
+  for (const auto& [member, value] : {std::pair<const char*, nlohmann::json>{"name", "other"},
+                                      {"digest", std::string(32, '0')},
+                                      {"digest", 7}}) {
+    SCOPED_TRACE(member);
+    nlohmann::ordered_json index = intact;
+    index["manifest"][member] = value;
+    write_index("p", index);
+    EXPECT_THAT(check_error("p"), testing::HasSubstr("package.json: 'digest' of the manifest is"));
+  }
+  write_index("p", intact);
   check("p");
 }
 
