@@ -90,16 +90,22 @@ export class PackageSource {
   }
 
   async fetchIndex(signal) {
-    let index = null;
-    try {
-      index = JSON.parse(await this.files.text("package.json", signal));
-    } catch (error) {
-      if (error instanceof TileError) throw error;
-    }
-    if (index?.format !== kFormat || !kVersions.includes(index.version))
+    const index = await this.fetchAnyIndex(signal);
+    if (!kVersions.includes(index?.version))
       throw new TileError(
           200, `package.json is not the index of a package of version ${kVersions.join(" or ")}.`);
     return index;
+  }
+
+  // Resolves to the index of a package of any version, or to null if the file is not an index.
+  async fetchAnyIndex(signal) {
+    const text = await this.files.text("package.json", signal);
+    try {
+      const index = JSON.parse(text);
+      return index?.format === kFormat ? index : null;
+    } catch {
+      return null;
+    }
   }
 
   // Resolves to a list with the words of each tile of `nodes`, in the same order. If the block of a
@@ -220,8 +226,11 @@ export class PackageSource {
 
   async look(signal) {
     try {
-      const index = await this.fetchIndex(signal);
-      if (index.manifest?.digest !== this.info.digest) this.ended = kReplaced;
+      const index = await this.fetchAnyIndex(signal);
+      // Later versions can store the digest elsewhere, but their files are others in any case.
+      const isSame =
+          kVersions.includes(index?.version) && index.manifest?.digest === this.info.digest;
+      if (index && !isSame) this.ended = kReplaced;
       this.lookedMs = performance.now();
     } catch (error) {
       if (error.isMissing) this.ended = kRemoved;
