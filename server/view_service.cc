@@ -40,7 +40,8 @@ ViewService::ViewService(const std::string& path, int port, FileSystem& files, L
        .subject = "The file: ",
        .manifest_schema = "TileManifest",
        .packing = Packing::kNone,
-       .file_name = file_name_of(path)},
+       .file_name = file_name_of(path),
+       .audience = &kCommandLineUsers},
       [this](const Call&) {
         auto permit = tiles_.acquire("");
         if (!permit) throw busy("too many concurrent requests for tiles: " + tiles_.limits(), 1);

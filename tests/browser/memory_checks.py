@@ -27,6 +27,7 @@ MANY_TILES = """async ([budgetBytes, maxFailures, first, all]) => {
     info,
     batchMax: 64,
     ended: null,
+    damage: {code: "damaged", message: ""},
     timeoutMs: 1000,
     fetchTiles: async (nodes) => {
       if (nodes.some(({offset}) => offset % bad === 0))

@@ -12,6 +12,7 @@
 #include "server/api/access/tokens.h"
 #include "server/view_service.h"
 #include "tests/server/running_service.h"
+#include "tests/support/flip_bits.h"
 
 namespace voxdag::server {
 namespace {
@@ -73,6 +74,25 @@ class Tiles : public RunningService {
   Json manifest_;
   uint32_t levels_ = 0;
 };
+
+// Clients have no file, so the advice is not a command that needs one.
+TEST_F(Tiles, OfADamagedResultAdviseANewJob) {
+  finish_job();
+  stop();
+  const auto file = open_global_file(result_);
+  const uint32_t bricks = file->brick_level();
+  uint64_t node = 0;
+  for (uint32_t l = 0; l + 1 < bricks; ++l) node = file->node(l, node).child(0);
+  flip_bits(result_, file->level(bricks).file_offset + 4 * file->node(bricks - 1, node).child(0),
+            4);
+  start();
+  const ClientResponse answer =
+      http_->get(base_ + "/" + std::to_string(bricks - 1) + "/" + std::to_string(node) + version_);
+  EXPECT_EQ(not_problem(answer, 500, "corrupt"), "");
+  EXPECT_NE(answer.body.find("is damaged: submit a new job of the scene"), std::string::npos)
+      << answer.body;
+  EXPECT_EQ(answer.body.find("voxdag verify"), std::string::npos) << answer.body;
+}
 
 TEST_F(Tiles, HaveAManifest) {
   finish_job();

@@ -148,10 +148,13 @@ Response immutable_response(const Call& call, const TileSource& dag, const std::
 // Returns the problem that is sent to clients. The problem's text omits the error's message,
 // because the message contains the name of the file. The service logs the message of the first
 // damage.
-Problem damaged(const TileSource& dag, const Error& error) {
-  Problem result = problem(ErrorCode::kCorrupt,
-                           "the requested part of the DAG or of its colors is damaged: "
-                           "run 'voxdag verify' on the file, and build it again");
+Problem damaged(const TileSource& dag, const Audience& audience, const Error& error) {
+  const std::string verify = audience.spell_command("verify", "", "");
+  Problem result =
+      problem(ErrorCode::kCorrupt,
+              "the requested part of the DAG or of its colors is damaged: " +
+                  (verify.empty() ? "submit a new job of the scene"
+                                  : "run '" + verify + "' on the file, and build it again"));
   if (dag.is_first_damage()) result.log_text = error.message();
   return result;
 }
@@ -168,7 +171,8 @@ void expect_unchanged(const TileSource& dag) {
 // another error. (Unreadable pages read as zeros, and a file that is being overwritten mixes old
 // and new parts.)
 template <class Answer>
-Response consistent_response(const Call& call, const TileSource& dag, const Answer& answer) {
+Response consistent_response(const Call& call, const TileSource& dag, const Audience& audience,
+                             const Answer& answer) {
   dag.expect_readable();  // a file known to be damaged is not read again
   try {
     Response response = answer(call, dag);
@@ -176,7 +180,7 @@ Response consistent_response(const Call& call, const TileSource& dag, const Answ
     return response;
   } catch (const Error& error) {
     expect_unchanged(dag);
-    if (error.code() == ErrorCode::kCorrupt) throw damaged(dag, error);
+    if (error.code() == ErrorCode::kCorrupt) throw damaged(dag, audience, error);
     throw;
   } catch (...) {
     expect_unchanged(dag);
@@ -330,9 +334,9 @@ void add_tile_routes(Router& router, const TileRoutes& routes, const OpenTiles& 
                 .query = query,
                 .answers = answers,
                 .problems = {404, 409, 410}},
-               [open, answer, packing = routes.packing](Call& call) {
+               [open, answer, packing = routes.packing, audience = routes.audience](Call& call) {
                  TileAccess access = open(call);
-                 Response response = consistent_response(call, *access.dag, answer);
+                 Response response = consistent_response(call, *access.dag, *audience, answer);
                  if (packing == Packing::kGzip) pack(call.request, response);
                  hold_permit(std::move(access.permit), response);
                  return response;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "server/api/routing/router.h"
+#include "server/jobs/protocol/spell_options.h"
 #include "server/tiles/tile_source.h"
 
 namespace voxdag::server {
@@ -34,6 +35,8 @@ struct TileRoutes {
   Packing packing = Packing::kGzip;
   Colors colors = Colors::kServed;
   std::string file_name = {};  // "name" in the manifest; "": no such member
+  // The users who read the messages. Clients of jobs have no file, so no command can check it.
+  const Audience* audience = &kJobUsers;
 };
 
 // Adds BASE/tiles, BASE/tiles/batch, BASE/tiles/{level}/{offset} and, if colors are served,

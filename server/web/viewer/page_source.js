@@ -17,5 +17,6 @@ export function isPublished() {
 }
 
 export function sourceOfPage(headers = {}) {
-  return makePublished ? makePublished() : new TileSource({base: "/api/v1/view", headers});
+  return makePublished ? makePublished() :
+                         new TileSource({base: "/api/v1/view", headers, isJob: false});
 }

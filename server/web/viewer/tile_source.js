@@ -15,6 +15,15 @@ const kRemoved = {
   code: "removed",
   message: "The file was removed: its missing parts cannot be loaded."
 };
+const kDamaged = {
+  code: "damaged",
+  message: "Part of the file is damaged and drawn coarse: run voxdag verify."
+};
+// The users of a service have no file, so they cannot verify it.
+const kResultDamaged = {
+  code: "damaged",
+  message: "Part of the result is damaged and drawn coarse: submit a new job of the scene."
+};
 
 // `status` is the HTTP status: 0 if there was no answer, 200 for an answer that makes no sense.
 // `code` is the error code from the service.
@@ -50,8 +59,9 @@ export class TileError extends Error {
 
 export class TileSource {
   // `base`: the path before "/tiles", without a slash at its end. `headers`: header fields that
-  // every request has.
-  constructor({base, headers = {}}) {
+  // every request has. `isJob`: the file is the result of a job, perhaps unfinished.
+  constructor({base, headers = {}, isJob = true}) {
+    this.damage = isJob ? kResultDamaged : kDamaged;
     this.base = base;
     this.headers = headers;
     this.info = null;

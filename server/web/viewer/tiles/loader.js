@@ -14,10 +14,6 @@ const kMaxFailures = 65536;  // maximum number of remembered failures
 const kMaxWarnings = 20;
 const kFullPauseMs = 250;
 
-const kDamaged = {
-  code: "damaged",
-  message: "Part of the file is damaged and drawn coarse: run voxdag verify."
-};
 const kRefused = {
   code: "refused",
   message: "Part of the file is drawn coarse: the service fails to send it."
@@ -29,8 +25,8 @@ export function pauseAfter(failures) {
   return Math.min(kMaxPauseMs, kFirstPauseMs * 2 ** (failures - 1)) * (0.5 + 0.5 * Math.random());
 }
 
-// Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. Derived classes have
-// these functions:
+// Base class of TileLoader and ColorLoader. A request is {key, priority, ...}. `source.damage` is
+// the problem that the page reports for a damaged item. Derived classes have these functions:
 //
 //     async fetchAll(batch, options)
 //                                    resolves to the answers, in the order of the requests; an
@@ -261,7 +257,7 @@ export class Loader {
     else
       this.refusal = isAnswer && !error.isMissing && error.code !== "corrupt" ?
           this.refusal ?? kRefused :
-          this.source.damage ?? kDamaged;
+          this.source.damage;
     if (this.warnings++ < kMaxWarnings)
       console.warn(`voxdag: ${this.nameOf(request)} is unusable${
           count < kMaxTries ? " and is requested again" : ""}: ${error.message}`);
