@@ -1,5 +1,6 @@
 #include "scene/import/assimp_scene.h"
 
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 
@@ -17,9 +18,24 @@ constexpr int kRemoved = aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGEN
                          aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS | aiComponent_LIGHTS |
                          aiComponent_CAMERAS;
 
+// Records which files assimp opens.
+class RecordingFiles : public Assimp::DefaultIOSystem {
+ public:
+  explicit RecordingFiles(std::set<std::string>& opened) : opened_(opened) {}
+  Assimp::IOStream* Open(const char* path, const char* mode) override {
+    Assimp::IOStream* const stream = DefaultIOSystem::Open(path, mode);
+    if (stream) opened_.insert(path);
+    return stream;
+  }
+
+ private:
+  std::set<std::string>& opened_;
+};
+
 }  // namespace
 
 AssimpScene::AssimpScene(const std::string& path) : path_(path) {
+  importer_.SetIOHandler(new RecordingFiles(opened_));  // the importer deletes it
   importer_.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
   importer_.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, kRemoved);
   scene_ = importer_.ReadFile(path, 0);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <assimp/Importer.hpp>
+#include <set>
 #include <string>
 
 #include "core/base/warning.h"
@@ -25,6 +26,9 @@ class AssimpScene {
   std::array<double, 16> to_gltf() const;
   // Returns warnings about the parts of the file that import_scene() does not write to the .glb.
   const WarningList& losses() const { return losses_; }
+  // Returns the paths of all files that assimp has opened: the scene file, and files that it names,
+  // such as the .mtl file of an .obj file. Images are not among them.
+  const std::set<std::string>& opened() const { return opened_; }
 
  private:
   struct Axis {
@@ -39,6 +43,7 @@ class AssimpScene {
   std::array<Axis, 3> axes() const;
 
   const std::string path_;
+  std::set<std::string> opened_;
   Assimp::Importer importer_;
   const aiScene* scene_ = nullptr;
   WarningList losses_;

@@ -25,6 +25,8 @@ class GlbExport {
 
   // Returns the report. Its number of bytes is known only after write().
   const ImportReport& report() const { return report_; }
+  // Returns the paths of the images that write() copies from other files.
+  std::vector<std::string> image_files() const { return materials_.image_files(); }
   // Writes "<path>.partial". Calls advance(triangles) after each mesh. Throws Error.
   void write(const std::string& path, MemoryBudget& budget,
              const std::function<void(uint64_t)>& advance);

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/io/overwrite.h"
 #include "scene/glb_file.h"
 #include "scene/import/confined_process.h"
 #include "scene/import/glb_export.h"
@@ -29,6 +30,10 @@ void convert(FileSystem& files, const std::string& input, const std::string& out
   const AssimpScene scene(input);
   warnings.add(scene.losses().list());
   GlbExport glb(scene, files, warnings);
+  std::vector<std::string> inputs = glb.image_files();
+  inputs.insert(inputs.end(), scene.opened().begin(), scene.opened().end());
+  const std::string outputs[] = {output, output + ".partial"};
+  refuse_inputs(files, outputs, inputs);
   send_warnings();
   send({{"triangles", glb.report().triangles}});
   MemoryBudget budget(memory_bytes);
@@ -54,6 +59,7 @@ class Receiver {
     if (message.contains("warning")) {
       warn_({message["warning"], message["place"], message["text"], message["count"]});
     } else if (message.contains("triangles")) {
+      is_writing = true;
       progress_.advance(bytes_);
       progress_.end_stage();
       progress_.begin_stage("write", message["triangles"], "triangles");
@@ -67,6 +73,7 @@ class Receiver {
   }
 
   ImportReport report;
+  bool is_writing = false;  // the child may have changed the output
 
  private:
   const uint64_t bytes_;
@@ -81,9 +88,11 @@ ImportReport import_scene(FileSystem& files, const std::string& input, const std
                           Progress& progress, const CancelToken& cancel) {
   const uint64_t input_bytes = files.open_read(input)->size();
   const std::string partial = output + ".partial";
-  files.create(partial)->close();  // so that the child may replace this file
+  // An existing file is kept until the child has found out that the scene does not consist of it.
+  const bool is_new = !files.exists(partial);
+  if (is_new) files.create(partial)->close();  // so that the child may replace this file
+  Receiver receiver(input_bytes, warn, progress);
   try {
-    Receiver receiver(input_bytes, warn, progress);
     run_confined(
         input, memory_bytes,
         [&](const SendMessage& send) { convert(files, input, output, memory_bytes, send); },
@@ -93,7 +102,7 @@ ImportReport import_scene(FileSystem& files, const std::string& input, const std
     progress.end_stage();
     return receiver.report;
   } catch (...) {
-    if (files.exists(partial)) files.remove(partial);
+    if ((is_new || receiver.is_writing) && files.exists(partial)) files.remove(partial);
     throw;
   }
 }

@@ -21,8 +21,9 @@ struct ImportReport {
 };
 
 // Writes `output` from `input`. assimp runs in a child process that may use `memory_bytes` of
-// memory (confined_process.h). Calls warn() for each kind of content that is lost. Throws Error.
-// After any failure, also of warn(), neither `output` nor "<output>.partial" remains.
+// memory (confined_process.h). Calls warn() for each kind of content that is lost. Throws Error,
+// also if `output` or "<output>.partial" is a file of the scene, such as an image. After any other
+// failure, also of warn(), neither `output` nor "<output>.partial" remains.
 ImportReport import_scene(FileSystem& files, const std::string& input, const std::string& output,
                           uint64_t memory_bytes, const std::function<void(const Warning&)>& warn,
                           Progress& progress, const CancelToken& cancel);

@@ -187,6 +187,13 @@ MaterialExport::Image MaterialExport::open_image(const std::string& path) const 
   return image;
 }
 
+std::vector<std::string> MaterialExport::image_files() const {
+  std::vector<std::string> paths;
+  for (const Image& image : images_)
+    if (image.file) paths.push_back(image.file->path());
+  return paths;
+}
+
 void MaterialExport::add_to(json& root, GlbArrays& arrays) const {
   if (!materials_.empty()) root["materials"] = materials_;
   for (const Image& image : images_) {

@@ -25,6 +25,8 @@ class MaterialExport {
   MaterialExport(const AssimpScene& scene, FileSystem& files, WarningList& warnings);
 
   size_t image_count() const { return images_.size(); }
+  // Returns the paths of the images that are not embedded in the scene file.
+  std::vector<std::string> image_files() const;
   // Returns the set of texture coordinates that a material uses.
   unsigned uv_channel(unsigned material) const { return uv_channels_[material]; }
   // Adds the materials, textures, samplers and images to the root of the .glb, and the images to

@@ -1,5 +1,6 @@
 // `voxdag import`, from a file of another format to a .vdag.
 #include "tests/cli/command_line.h"
+#include "tests/support/image_files.h"
 
 namespace command_line {
 namespace {
@@ -32,6 +33,23 @@ TEST_F(Import, MakesASceneThatCanBeBuilt) {
   expect_error(2, "--force", {"import", "a.off", "other.glb"});
   EXPECT_EQ(run({"import", "a.off", "other.glb", "--force"}).status, 0);
   expect_error(2, "would be overwritten", {"import", "a.off", "a.off", "--force"});
+}
+
+// A scene can consist of several files. None of them is overwritten, even with --force.
+TEST_F(Import, KeepsAllFilesOfTheScene) {
+  const std::string triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+  put("s.obj", "mtllib s.mtl\nusemtl m\n" + triangle);
+  put("s.mtl", "newmtl m\nmap_Kd s.png.partial\n");
+  put("s.png.partial", voxdag::test::png_file({}, std::string(4, 0)));
+  for (const char* output : {"s.obj", "s.mtl", "s.png.partial", "s.png"}) {
+    SCOPED_TRACE(output);
+    const std::string image = contents("s.png.partial"), library = contents("s.mtl");
+    expect_error(2, "would be overwritten", {"import", "s.obj", output, "--force"});
+    EXPECT_EQ(contents("s.png.partial"), image);
+    EXPECT_EQ(contents("s.mtl"), library);
+  }
+  EXPECT_FALSE(exists("s.png"));
+  EXPECT_EQ(run_json({"import", "s.obj", "s.glb", "--force"})["images"], 1);
 }
 
 TEST_F(Import, FaultsHaveTheirExitStatus) {
