@@ -4,8 +4,11 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
+#include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <sstream>
 #include <type_traits>
@@ -19,10 +22,46 @@ namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
 
+// Returns the key of a line of a TOML or INI file: "threads" for `threads = 4`. Returns "" for
+// other lines, such as sections and comments.
+std::string config_key(std::string line) {
+  line.erase(std::min(line.find_first_of("#;"), line.size()));
+  line.erase(std::min(line.find('='), line.size()));
+  std::string key = CLI::detail::trim(line);
+  CLI::detail::remove_quotes(key);
+  constexpr const char* kAllowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_";
+  const bool is_key = !key.empty() && !std::isdigit(static_cast<unsigned char>(key[0])) &&
+                      key.find_first_not_of(kAllowed) == std::string::npos;
+  return is_key ? key : "";
+}
+
+// Throws if a file of options gives an option of `command` twice. CLI11 joins the values, and only
+// the last one would count.
+void check_config_keys(const std::string& path, const std::string& text, const CLI::App& command) {
+  std::map<const CLI::Option*, size_t> lines;
+  std::istringstream rest(text);
+  std::string line;
+  for (size_t number = 1; std::getline(rest, line); ++number) {
+    const std::string key = config_key(line);
+    const CLI::Option* const option =
+        key.empty() ? nullptr : command.get_option_no_throw("--" + key);
+    if (!option) continue;
+    const auto [first, is_new] = lines.emplace(option, number);
+    if (!is_new)
+      throw Error(ErrorCode::kInvalidInput, path + ":" + std::to_string(number) + ": '" + key +
+                                                "' is given several times, first in line " +
+                                                std::to_string(first->second) +
+                                                ": expected it once");
+  }
+}
+
 // Reads a TOML or INI file, and sets the options that the command line does not give. CLI11 itself
 // supports such files only for the complete program, not for a single command.
 void read_config_file(const std::string& path, CLI::App& command) {
-  std::istringstream text(read_small_file(system_files(), path, kMaxConfigBytes));
+  const std::string bytes = read_small_file(system_files(), path, kMaxConfigBytes);
+  check_config_keys(path, bytes, command);
+  std::istringstream text(bytes);
   for (const CLI::ConfigItem& item : CLI::ConfigTOML().from_config(text)) {
     CLI::Option* const option = command.get_option_no_throw("--" + item.fullname());
     if (!option || !option->get_configurable())
@@ -35,15 +74,21 @@ void read_config_file(const std::string& path, CLI::App& command) {
   }
 }
 
-// Returns "" if `text` is a whole number that T can hold, otherwise an error message. CLI11's own
-// conversion is not used, because it turns -4 into 2^64 - 4 for unsigned types, and its errors do
-// not state the expected value.
-template <class T>
-std::string integer_problem(const std::string& text) {
-  if (parse_numbers<T, 1>(text, ',')) return "";
-  using Limits = std::numeric_limits<T>;
-  return "'" + text + "': expected a whole number from " + std::to_string(Limits::min()) + " to " +
-         std::to_string(Limits::max());
+constexpr const char* kWholeNumber = "whole number";  // name of the check of such an option
+
+// Returns a check for whole numbers from `low` to `high`. CLI11's own conversion is not used,
+// because it turns -4 into 2^64 - 4 for unsigned types, and its errors do not state the expected
+// value.
+std::function<std::string(std::string&)> whole_number_check(int64_t low, uint64_t high) {
+  return [low, high](const std::string& text) -> std::string {
+    const auto is_signed = parse_numbers<int64_t, 1>(text, ',');
+    const auto is_unsigned = parse_numbers<uint64_t, 1>(text, ',');
+    if (is_unsigned ? (*is_unsigned)[0] <= high && (!is_signed || (*is_signed)[0] >= low)
+                    : is_signed && (*is_signed)[0] >= low)
+      return "";
+    return "'" + text + "': expected a whole number from " + std::to_string(low) + " to " +
+           std::to_string(high);
+  };
 }
 
 // Replaces forms of `help` and `version` that CLI11 does not know: `help build` becomes `build
@@ -143,23 +188,25 @@ std::string path_problem(const std::string& path) {
                      : "";
 }
 
-Option Option::required() { return Option(option_->required()); }
-Option Option::optional() { return Option(option_->required(false)); }
-Option Option::group(const char* heading) { return Option(option_->group(heading)); }
-Option Option::environment(const char* variable) { return Option(option_->envname(variable)); }
-Option Option::show_default() { return Option(option_->capture_default_str()); }
-Option Option::one_value_each() { return Option(option_->allow_extra_args(false)); }
+Option Option::required() { return Option(option_->required(), max_); }
+Option Option::optional() { return Option(option_->required(false), max_); }
+Option Option::group(const char* heading) { return Option(option_->group(heading), max_); }
+Option Option::environment(const char* variable) {
+  return Option(option_->envname(variable), max_);
+}
+Option Option::show_default() { return Option(option_->capture_default_str(), max_); }
+Option Option::one_value_each() { return Option(option_->allow_extra_args(false), max_); }
 Option Option::positive() {
-  const auto problem = [](const std::string& text) {
-    const bool positive = text.find_first_of("123456789") != std::string::npos;
-    return positive ? "" : "'" + text + "': expected a number above 0";
-  };
-  return Option(option_->check(problem, "POSITIVE"));
+  option_->get_validator(kWholeNumber)
+      ->operation(whole_number_check(1, max_))
+      .description("POSITIVE");
+  return *this;
 }
 Option Option::range(int low, int high) {
-  return Option(option_->check(
-      expecting("a whole number from " + std::to_string(low) + " to " + std::to_string(high),
-                CLI::Range(low, high))));
+  option_->get_validator(kWholeNumber)
+      ->operation(whole_number_check(low, static_cast<uint64_t>(high)))
+      .description(CLI::Range(low, high).get_description());
+  return *this;
 }
 Option Option::range(double low, double high) {
   return Option(option_->check(expecting(
@@ -169,17 +216,21 @@ Option Option::one_of(const std::vector<std::string>& values) {
   return Option(option_->check(expecting("one of " + joined(values), CLI::IsMember(values))));
 }
 Option Option::check(std::string (*problem)(const std::string&)) {
-  return Option(option_->check(problem));
+  return Option(option_->check(problem), max_);
 }
-Option Option::excludes(Option other) { return Option(option_->excludes(other.option_)); }
-Option Option::needs(Option other) { return Option(option_->needs(other.option_)); }
+Option Option::excludes(Option other) { return Option(option_->excludes(other.option_), max_); }
+Option Option::needs(Option other) { return Option(option_->needs(other.option_), max_); }
 
 template <class T>
 Option Command::option(const char* names, T& value, const char* description) {
   CLI::Option* const option = app_->add_option(names, value, description);
-  if constexpr (std::is_integral_v<T>) option->check(integer_problem<T>);
-  if constexpr (std::is_same_v<T, std::optional<uint64_t>>)
-    option->check(integer_problem<uint64_t>);
+  using Number = std::conditional_t<std::is_same_v<T, std::optional<uint64_t>>, uint64_t, T>;
+  if constexpr (std::is_integral_v<Number>) {
+    using Limits = std::numeric_limits<Number>;
+    option->check(
+        CLI::Validator(whole_number_check(Limits::min(), Limits::max()), "", kWholeNumber));
+    return Option(option, Limits::max());
+  }
   return Option(option);
 }
 template Option Command::option(const char*, int&, const char*);

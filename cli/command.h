@@ -41,7 +41,8 @@ std::string path_problem(const std::string& path);
 // A handle of a command's option. Each member function returns the handle, so calls can be chained.
 class Option {
  public:
-  explicit Option(CLI::Option* option) : option_(option) {}
+  // `max` is the maximum of the option's type, if its values are whole numbers.
+  explicit Option(CLI::Option* option, uint64_t max = 0) : option_(option), max_(max) {}
   Option required();
   Option optional();
   Option group(const char* heading);
@@ -52,6 +53,7 @@ class Option {
   // For an option whose value is a list: makes each occurrence of the option take one item. Without
   // this call, an occurrence takes all arguments up to the next option.
   Option one_value_each();
+  // For options whose values are whole numbers: narrow the accepted range.
   Option positive();
   Option range(int low, int high);
   Option range(double low, double high);
@@ -64,6 +66,7 @@ class Option {
 
  private:
   CLI::Option* option_;
+  uint64_t max_;
 };
 
 // A handle of a command. A function that adds an option takes a reference to a variable. Parsing

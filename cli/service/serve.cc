@@ -110,8 +110,9 @@ void add_serve_commands(CommandLine& line) {
   const auto state = std::make_shared<ServeCommand>();
   server::ServerConfig& options = state->options;
   command.option("--listen", options.http.address, "address to listen on (default: 127.0.0.1)");
-  command.option("--port", options.http.port,
-                 "port to listen on, 0 for any free one (default: 8080)");
+  command
+      .option("--port", options.http.port, "port to listen on, 0 for any free one (default: 8080)")
+      .range(0, 65535);
   command.option("--data", options.data_folder, "data folder: queue, scenes and results");
   command.option("--config", state->config_file, "settings in JSON (docs/operating.md)");
   command.option("--tokens", options.token_file, "file of hashed bearer tokens");

@@ -209,6 +209,14 @@ TEST_F(BuildCommand, ReadsOptionsFromAFile) {
       run_json({"build", "m.glb", "-o", "m.vdag", "--config", "options.toml", "-r", "64"});
   EXPECT_EQ(late["resolution"], 64);
   EXPECT_EQ(late["hash_bits"], 16);
+  put("twice.toml", "# a comment\nresolution = 32\n\nhash-bits = 16\nresolution = 64\n");
+  expect_error(2, "twice.toml:5: 'resolution' is given several times, first in line 2",
+               {"build", "m.glb", "-o", "x.vdag", "--config", "twice.toml"});
+  put("array.toml",
+      "[default]\n\"attributes\" = [ # of the voxels\n  color,\n  alpha\n]\n"
+      "attributes = color\nresolution = 32\n");
+  expect_error(2, "array.toml:6: 'attributes' is given several times, first in line 2",
+               {"build", "m.glb", "-o", "x.vdag", "--config", "array.toml"});
   put("wrong.toml", "resolutoin = 32\n");
   expect_error(2, "resolutoin", {"build", "m.glb", "-o", "x.vdag", "--config", "wrong.toml"});
 }
@@ -231,6 +239,8 @@ TEST_F(BuildCommand, RefusesWrongOptions) {
       {{"-r", "64", "--memory", "lots"}, 2, "--memory"},
       {{"-r", "64", "--memory", "-1GiB"}, 2, "--memory"},
       {{"-r", "64", "--memory", "1GiBs"}, 2, "--memory"},
+      {{"-r", "64", "--threads", "x"}, 2, "'x': expected a whole number from 1 to 1024"},
+      {{"-r", "64", "--threads", "-1"}, 2, "'-1': expected a whole number from 1 to 1024"},
       {{"-r", "64", "--hash-bits", "3"}, 2, "4 to 64"},
       {{"-r", "64", "--hash-bits", "65"}, 2, "4 to 64"},
       {{"-r", "64", "--subvolume", "96"}, 2, "power of two"},
