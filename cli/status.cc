@@ -5,8 +5,11 @@
 #include "cli/cluster.h"
 #include "cli/command.h"
 #include "cli/output.h"
+#include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
+#include "core/format/global/global_writer.h"
+#include "core/io/overwrite.h"
 #include "scheduler/state/job_status.h"
 #include "scheduler/state/work_folder.h"
 
@@ -42,13 +45,32 @@ void print(const JobStatus& status, FileSystem& files, const std::string& work_f
                 duration_text(stage.wall_s).c_str(), duration_text(stage.cpu_s).c_str());
 }
 
-void run(const StatusCommand& command, CommandContext& context) {
+bool has_build(FileSystem& files, const std::string& work_folder) {
+  return files.exists(WorkFolder::store_path(work_folder)) ||
+         !WorkFolder::holder(files, work_folder).empty();
+}
+
+// Returns the work folder of the given path, which can also be the output of a build.
+std::string find_work_folder(FileSystem& files, const std::string& path) {
+  if (has_build(files, path)) return path;
+  const std::string work_folder = path + ".work";
+  if (has_build(files, work_folder)) return work_folder;
+  const auto file = open_if_there(files, path);
+  if (file && is_global_file(*file))
+    throw Error(ErrorCode::kNotFound,
+                path +
+                    ": no build of this file is unfinished: expected a file with the work folder " +
+                    work_folder + "; '" + command_text("info") + "' describes a finished file");
+  return path;
+}
+
+void run(const StatusCommand& given, CommandContext& context) {
+  StatusCommand command = given;
+  command.work_folder = find_work_folder(context.files, given.work_folder);
   for (bool first = true;; first = false) {
     // The build can finish between two reads of its state. A finished build removes its work
     // folder.
-    if (!first && !context.files.exists(WorkFolder::store_path(command.work_folder)) &&
-        WorkFolder::holder(context.files, command.work_folder).empty())
-      return;
+    if (!first && !has_build(context.files, command.work_folder)) return;
     const JobStatus status = read_job_status(context.files, command.work_folder);
     if (command.json)
       print_json_text(status_json(status, cluster_status_json(context.files, command.work_folder)));
@@ -62,7 +84,8 @@ void run(const StatusCommand& command, CommandContext& context) {
 }
 
 void declare(Command& command, StatusCommand& state) {
-  command.option("work", state.work_folder, "the work folder, OUT.vdag.work by default").required();
+  command.option("work", state.work_folder, "the output OUT.vdag of the build, or its work folder")
+      .required();
   command.json_flag(state.json);
   command.flag("--watch", state.watch, "repeat every second until the build ends");
 }

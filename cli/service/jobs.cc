@@ -1,4 +1,6 @@
 #include <cstdio>
+#include <string>
+#include <vector>
 
 #include "cli/output.h"
 #include "cli/service/job_text.h"
@@ -19,31 +21,19 @@ struct JobsCommand {
   bool json = false;
 };
 
-// Prints a line of the table. On a terminal with `columns` columns, cuts it to this length, so that
-// each job has one line.
-void print_line(const std::string& line, size_t columns) {
-  std::printf("%s\n", (columns > 0 ? cut_to_columns(line, columns) : line).c_str());
-}
-
 void print(const Json& answer) {
-  constexpr size_t kMaxCells = 256;  // all columns before the name
-  const size_t columns = terminal_columns();
   const double now_s = unix_seconds();
-  const auto print_row = [&](const std::string& id, const std::string& state,
-                             const std::string& age, const std::string& resolution,
-                             const std::string& progress, const std::string& name) {
-    char cells[kMaxCells];
-    std::snprintf(cells, sizeof cells, "%-16s  %-10s  %6s  %10s  %-28s  ", id.c_str(),
-                  state.c_str(), age.c_str(), resolution.c_str(), progress.c_str());
-    print_line(cells + name, columns);
-  };
-  print_row("ID", "STATE", "AGE", "RESOLUTION", "PROGRESS", "NAME");
+  std::vector<std::vector<std::string>> rows = {
+      {"ID", "STATE", "AGE", "RESOLUTION", "PROGRESS", "NAME"}};
   for (const Json& job : answer.at("jobs"))
-    print_row(printable_line(job.at("id").get<std::string>()),
-              printable_line(job.at("state").get<std::string>()),
-              age_text(job.at("created_at").get<std::string>(), now_s),
-              exact_json_text(job.at("resolution")), progress_text(job),
-              job_title(job) + labels_text(job));
+    rows.push_back({printable_line(job.at("id").get<std::string>()),
+                    printable_line(job.at("state").get<std::string>()),
+                    age_text(job.at("created_at").get<std::string>(), now_s),
+                    exact_json_text(job.at("resolution")), progress_text(job),
+                    job_title(job) + labels_text(job)});
+  // On a terminal, each job has one line.
+  for (const std::string& line : table_lines(rows, "llrrll", terminal_columns()))
+    std::printf("%s\n", line.c_str());
   if (!answer.at("next_cursor").is_null()) std::printf("(more: raise --limit)\n");
 }
 
@@ -88,16 +78,16 @@ std::string check_states(const std::string& states) {
 void declare(Command& command, JobsCommand& state) {
   state.service.declare(command);
   command
-      .option(
-          "--state", state.states,
-          "only these states, comma-separated: queued, running, suspended, canceling, canceled, "
-          "failed, succeeded")
+      .option("--state", state.states,
+              "only jobs in these states: names out of queued, running, suspended, canceling, "
+              "canceled, failed, succeeded")
       .check(check_states);
   command.option("--label", state.label, "only jobs that have exactly this label");
   command.option("--find", state.words,
                  "only jobs whose name, scenes or labels contain this text, or whose id begins "
                  "with it");
-  command.option("--limit", state.limit, "maximum number of jobs, 1 to 200 (default 50)");
+  command.option("--limit", state.limit, "maximum number of jobs, 1 to 200 (default 50)")
+      .range(1, 200);
   command.json_flag(state.json, "one JSON object on standard output");
 }
 

@@ -15,6 +15,8 @@ namespace voxdag::cli {
 namespace {
 
 constexpr const char* kEllipsis = "\xe2\x80\xa6";
+constexpr std::string_view kGap = "  ";  // between two cells of a table
+constexpr size_t kMinLastColumns = 20, kMinCutColumns = 8;
 
 // Returns the number of columns of a character. The ranges are the blocks of Unicode whose
 // characters are mostly wide, and the blocks of combining characters.
@@ -27,6 +29,16 @@ size_t columns_of(char32_t code) {
                        is_in(0xf900, 0xfaff) || is_in(0xfe30, 0xfe6f) || is_in(0xff00, 0xff60) ||
                        is_in(0xffe0, 0xffe6) || is_in(0x1f300, 0x1faff) || is_in(0x20000, 0x3fffd);
   return is_wide ? 2 : 1;
+}
+
+size_t columns_of(std::string_view text) {
+  size_t columns = 0;
+  while (!text.empty()) {
+    const Character character = first_character(text);
+    columns += columns_of(character.code);
+    text.remove_prefix(character.bytes);
+  }
+  return columns;
 }
 
 }  // namespace
@@ -56,6 +68,33 @@ std::string cut_to_columns(const std::string& text, size_t columns) {
     if (used < columns) cut = at;
   }
   return text;
+}
+
+std::vector<std::string> table_lines(const std::vector<std::vector<std::string>>& rows,
+                                     std::string_view align, size_t columns) {
+  const size_t last = align.size() - 1;
+  std::vector<size_t> widths(align.size(), 0);
+  for (const auto& row : rows)
+    for (size_t i = 0; i < align.size(); ++i) widths[i] = std::max(widths[i], columns_of(row[i]));
+  size_t begin = 0;  // column at which the last cells begin
+  for (size_t i = 0; i < last; ++i) begin += widths[i] + kGap.size();
+  const size_t wanted = begin + std::min(widths[last], kMinLastColumns);
+  if (columns > 0 && wanted > columns) {
+    size_t& cut = widths[last - 1];
+    cut = std::min(cut, std::max(kMinCutColumns, cut - std::min(cut, wanted - columns)));
+  }
+  std::vector<std::string> lines;
+  for (const auto& row : rows) {
+    std::string line;
+    for (size_t i = 0; i < last; ++i) {
+      const std::string cell = cut_to_columns(row[i], widths[i]);
+      const std::string padding(widths[i] - columns_of(cell), ' ');
+      line += (align[i] == 'r' ? padding + cell : cell + padding) + std::string(kGap);
+    }
+    line += row[last];
+    lines.push_back(columns > 0 ? cut_to_columns(line, columns) : line);
+  }
+  return lines;
 }
 
 size_t terminal_columns() {

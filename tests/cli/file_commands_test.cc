@@ -245,6 +245,16 @@ TEST_F(FileCommands, PlanOfASolid) {
   EXPECT_NE(text.out.find("voxels inside"), std::string::npos) << text.out;
 }
 
+// Messages about different invalid values of an option name the same range.
+TEST_F(FileCommands, RangesOfNumbersAreNamedForAllValues) {
+  for (const std::string threads : {"x", "0", "-1", "1.5", "1025", "99999999999999999999"})
+    expect_error(2, "'" + threads + "': expected a whole number from 1 to 1024",
+                 {"verify", "m.vdag", "--threads", threads});
+  for (const std::string port : {"x", "-1", "65536"})
+    expect_error(2, "'" + port + "': expected a whole number from 0 to 65535",
+                 {"serve", "--port", port});
+}
+
 // status reports the state of the build in a work folder. The command fails if the folder does not
 // exist.
 TEST_F(FileCommands, StatusNames) {
@@ -254,7 +264,10 @@ TEST_F(FileCommands, StatusNames) {
   EXPECT_EQ(status["subvolumes"]["built"], status["subvolumes"]["total"]);
   for (const char* name : {"stages", "stage", "memory_bytes", "disk_bytes", "last_error"})
     EXPECT_TRUE(status.contains(name)) << name;
+  EXPECT_EQ(run_json({"status", "m.vdag"}), status) << "the name of the output is enough";
   expect_error(3, "none.work", {"status", "none.work"});
+  run_json({"build", "m.glb", "-r", "64", "-o", "done.vdag"});
+  expect_error(3, "'voxdag info' describes a finished file", {"status", "done.vdag"});
 }
 
 // The same seed generates the same bytes, and another seed generates different bytes.

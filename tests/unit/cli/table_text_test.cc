@@ -37,5 +37,28 @@ TEST(TableText, IsCutToTheColumns) {
   EXPECT_EQ(cut_to_columns(std::string(100, '\x80'), 200), std::string(100, '\x80'));
 }
 
+using Lines = std::vector<std::string>;
+
+TEST(TableText, ColumnsAreAsWideAsTheirCells) {
+  EXPECT_EQ(
+      table_lines({{"ID", "AGE", "NAME"}, {"17", "3 min", "\u57ce"}, {"4", "", "b"}}, "lrl", 0),
+      (Lines{"ID    AGE  NAME", "17  3 min  \u57ce", "4          b"}));
+  EXPECT_EQ(table_lines({{"\u57ce", "a", "x"}, {"cc", "b", "y"}}, "lll", 80),
+            (Lines{"\u57ce  a  x", "cc  b  y"}));
+}
+
+// On a narrow terminal, the name keeps 20 columns if the column before it can be cut.
+TEST(TableText, LeavesSpaceForTheName) {
+  const std::string name(50, 'n'), state = "build: 32 %, 31.4 s left";
+  const std::vector<std::vector<std::string>> rows = {{"id", state, name}};
+  EXPECT_EQ(table_lines(rows, "lll", 100), (Lines{"id  " + state + "  " + name}));
+  EXPECT_EQ(table_lines(rows, "lll", 50),
+            (Lines{"id  " + state + "  " + name.substr(0, 19) + "\u2026"}));
+  EXPECT_EQ(table_lines(rows, "lll", 40),
+            (Lines{"id  build: 32 %, \u2026  " + name.substr(0, 19) + "\u2026"}));
+  EXPECT_EQ(table_lines(rows, "lll", 20), (Lines{"id  build: \u2026  nnnnn\u2026"}));
+  EXPECT_EQ(table_lines({{"id", state, "n"}}, "lll", 31), (Lines{"id  " + state + "  n"}));
+}
+
 }  // namespace
 }  // namespace voxdag::cli
