@@ -114,9 +114,9 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
   const std::string& output = spec.run.output;
   const std::string work = work_folder_of(spec.run);
   if (output.empty())
-    throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path (-o)");
+    throw Error(ErrorCode::kInvalidInput, "no output file was given: expected a path");
   if (output.ends_with('/'))
-    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a file, not a folder");
+    throw Error(ErrorCode::kInvalidInput, output + ": expected a file, not a folder");
   const auto resolved = [](const std::string& path) {
     return std::filesystem::weakly_canonical(path + "/.");
   };

@@ -65,10 +65,10 @@ void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
       report ? "is the result of another scene, " + joined(report->scenes)
              : "exists, and no report shows that " + joined(scenes) + " is its scene";
   const std::string force = option_text("force");
-  throw Error(ErrorCode::kInvalidInput,
-              "-o " + run.output + ": " + found + ", and would be replaced" +
-                  (report ? " by " + joined(scenes) : "") + ": expected another output" +
-                  (force.empty() ? "" : "; " + force + " replaces it"));
+  throw Error(ErrorCode::kInvalidInput, run.output + ": " + found + ", and would be replaced" +
+                                            (report ? " by " + joined(scenes) : "") +
+                                            ": expected another output" +
+                                            (force.empty() ? "" : "; " + force + " replaces it"));
 }
 
 }  // namespace voxdag

@@ -49,24 +49,6 @@ void print_chunks(const ExportCommand& command, const query::ChunksReport& repor
               count_text(report.voxels).c_str(), duration_text(wall_s).c_str());
 }
 
-// Returns the facts of the report as a JSON object. The value of a fact is a number or a list of
-// numbers. Whole numbers are written as integers.
-nlohmann::ordered_json facts_json(const query::ExportReport& report) {
-  const auto number = [](double value) {
-    const auto whole = static_cast<int64_t>(value);
-    return static_cast<double>(whole) == value ? nlohmann::ordered_json(whole)
-                                               : nlohmann::ordered_json(value);
-  };
-  auto facts = nlohmann::ordered_json::object();
-  for (const auto& [name, numbers] : report.facts) {
-    if (numbers.size() == 1)
-      facts[name] = number(numbers[0]);
-    else
-      for (const double value : numbers) facts[name].push_back(number(value));
-  }
-  return facts;
-}
-
 void run(const ExportCommand& command, CommandContext& context) {
   query::ExportRequest request;
   request.format = &query::export_format(command.format);
@@ -95,7 +77,7 @@ void run(const ExportCommand& command, CommandContext& context) {
                                     {"bytes", report.bytes},
                                     {"voxels", report.voxels},
                                     {"notes", report.notes},
-                                    {"facts", facts_json(report)},
+                                    {"facts", query::facts_json(report)},
                                     {"peak_rss_bytes", peak_resident_bytes()},
                                     {"wall_s", wall_s}});
 }

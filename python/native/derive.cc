@@ -67,13 +67,6 @@ std::string extract(const PathText& path, const PathText& output, uint32_t grid_
   });
 }
 
-nlohmann::json facts_json(const query::ExportReport& report) {
-  auto facts = nlohmann::json::object();
-  for (const auto& [name, numbers] : report.facts)
-    facts[name] = numbers.size() == 1 ? nlohmann::json(numbers[0]) : nlohmann::json(numbers);
-  return facts;
-}
-
 std::string export_file(const PathText& path, const PathText& output, const std::string& format,
                         uint32_t grid_levels, const Corner& low, const Corner& high,
                         const std::string& memory, bool gray, bool replace,
@@ -93,7 +86,7 @@ std::string export_file(const PathText& path, const PathText& output, const std:
     return nlohmann::json{{"bytes", report.bytes},
                           {"voxels", report.voxels},
                           {"notes", report.notes},
-                          {"facts", facts_json(report)}}
+                          {"facts", nlohmann::json(query::facts_json(report))}}
         .dump();
   });
 }

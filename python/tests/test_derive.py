@@ -42,6 +42,13 @@ def test_export(path, dag, tmp_path):
     assert "hashdag" in voxdag.export_formats()
 
 
+def test_facts_of_an_export_are_integers_where_they_count(path, tmp_path):
+    facts = voxdag.export(path, tmp_path / "map.bt", to="bt", level=5)["facts"]
+    assert isinstance(facts["nodes"], int) and facts["nodes"] > 0
+    assert isinstance(facts["reader_memory_bytes"], int)
+    assert len(facts["translation"]) == 3
+
+
 def test_export_in_gray(mesh, tmp_path):
     colored = tmp_path / "colored.vdag"
     voxdag.build(mesh, resolution=64, output=colored, memory="64MiB", color=True)

@@ -1,5 +1,6 @@
 #include "query/export/export.h"
 
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 
@@ -91,11 +92,27 @@ void check_export_options(const ExportFormat& format, const ExportOptions& optio
     throw FieldError("band", "a whole number from 1 to " + std::to_string(kMaxExportBand));
 }
 
+nlohmann::ordered_json facts_json(const ExportReport& report) {
+  const auto number = [](double value) {
+    const auto whole = static_cast<int64_t>(value);
+    return static_cast<double>(whole) == value ? nlohmann::ordered_json(whole)
+                                               : nlohmann::ordered_json(value);
+  };
+  auto facts = nlohmann::ordered_json::object();
+  for (const auto& [name, numbers] : report.facts) {
+    if (numbers.size() == 1)
+      facts[name] = number(numbers[0]);
+    else
+      for (const double value : numbers) facts[name].push_back(number(value));
+  }
+  return facts;
+}
+
 std::vector<std::string> export_paths(const ExportFormat& format, const std::string& output) {
   if (!format.suffix) return {output};
   const std::string_view suffix = format.suffix;
   if (output.size() <= suffix.size() || !output.ends_with(suffix))
-    throw Error(ErrorCode::kInvalidInput, "-o " + output + ": expected a name that ends in '" +
+    throw Error(ErrorCode::kInvalidInput, output + ": expected a name that ends in '" +
                                               format.suffix + "', which viewers look for");
   const std::string stem = output.substr(0, output.size() - suffix.size());
   return {output, stem + format.second_suffix};

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -33,6 +34,10 @@ struct ExportReport {
   void add_fact(const char* name, double number) { facts.push_back({name, {number}}); }
   void add_fact(const char* name, uint64_t number) { add_fact(name, static_cast<double>(number)); }
 };
+
+// Returns the facts of the report as a JSON object. The value of a fact is a number or a list of
+// numbers. Whole numbers are written as integers.
+nlohmann::ordered_json facts_json(const ExportReport& report);
 
 // The axis of the exported file along which the y axis of the .vdag file points. kOfFormat is the
 // default of the format.
