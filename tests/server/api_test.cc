@@ -59,7 +59,8 @@ uint64_t red_pixels(const std::string& png) {
 TEST_F(Api, TurnsASceneIntoADag) {
   start();
   ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);
-  const std::string id = post_job({{"scene", "m.glb"}, {"resolution", 512}, {"name", "my job"}});
+  const std::string id =
+      post_job({{"scene", "m.glb"}, {"resolution", 512}, {"name", "my \u00e9 job"}});
   ASSERT_TRUE(until_state(id, "succeeded"));
   const Json done = job(id);
   EXPECT_EQ(done["attempts"], 1);

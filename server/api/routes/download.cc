@@ -103,9 +103,16 @@ std::string download_stem(const Job& job, uint64_t resolution) {
     base = base.substr(base.rfind('/') + 1);
     base = base.substr(0, base.rfind('.'));
   }
-  for (char& c : base)
-    if (!isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_' && c != '-') c = '-';
-  return base.substr(0, 100) + "-" + std::to_string(resolution);
+  // Other characters, also those of several bytes, become one dash. fileName() in
+  // server/web/views/job_actions.js has the same rule.
+  std::string stem;
+  bool is_replaced = false;
+  for (const char c : base) {
+    const bool was_replaced = is_replaced;
+    is_replaced = !isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '_' && c != '-';
+    if (!is_replaced || !was_replaced) stem += is_replaced ? '-' : c;
+  }
+  return stem.substr(0, 100) + "-" + std::to_string(resolution);
 }
 
 Response download(Context& context, Call& call, std::shared_ptr<ReadableFile> file,

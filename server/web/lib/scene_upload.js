@@ -9,7 +9,6 @@ const kMaxFailures = 6;  // consecutive failures; the pauses between them grow
 const kSuffixes = "{{scene_suffixes}}";  // the service fills this in: "glb|gltf|ply|obj|stl"
 export const kSceneEndings = kSuffixes.split("|").map((suffix) => `.${suffix}`);
 export const kSceneName = new RegExp(`^[A-Za-z0-9][A-Za-z0-9._-]{0,122}\\.(${kSuffixes})$`, "i");
-export const kSceneEnding = new RegExp(`\\.(${kSuffixes})$`, "i");
 
 // "My scene (2).glb" -> "My-scene-2.glb"
 export function sceneName(fileName) {

@@ -192,7 +192,7 @@ class JobPage {
         h("div", {class: "title-row"}, h("h1", {}, titleText(job)), stateBadge(job.state)),
         h("p", {class: "about"}, job.name ? `${sceneText(job)} · ` : "", gridText(job.resolution)));
     const when = (time) =>
-        time ? [timeText(time), " ", h("span", {class: "faint"}, agoText(time))] : ["–"];
+        time ? [timeText(time), " ", h("span", {class: "faint unbroken"}, agoText(time))] : ["–"];
     const options =
         Object.entries(job.options || {}).map(([name, value]) => `${name} ${value}`).join(", ");
     clear(

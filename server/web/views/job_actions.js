@@ -2,9 +2,8 @@
 
 import {sendJson, token} from "../lib/api.js";
 import {clear, confirmAction, h} from "../lib/dom.js";
-import {hasEnded, titleText} from "../lib/format.js";
+import {hasEnded} from "../lib/format.js";
 import {saveFile} from "../lib/save_file.js";
-import {kSceneEnding} from "../lib/scene_upload.js";
 
 import {copyButton, problemBox} from "./parts.js";
 
@@ -73,9 +72,11 @@ async function deleteJob(job) {
   location.hash = "#/";
 }
 
+// Returns the name of the result's file: the same as the service gives to a download.
 function fileName(job) {
-  return `${
-      titleText(job).replace(kSceneEnding, "").replace(/[^A-Za-z0-9._-]+/g, "-") || "scene"}.vdag`;
+  const scene = Array.isArray(job.scene) ? job.scene[0] : job.scene;
+  const base = job.name || scene.split("/").pop().replace(/\.[^.]*$/, "");
+  return `${base.replace(/[^A-Za-z0-9._-]+/g, "-").slice(0, 100)}-${job.resolution}.vdag`;
 }
 
 function resultFile(job) {
