@@ -118,8 +118,8 @@ class ExportReport(TypedDict):
     bytes    total size of the files in bytes
     voxels   number of exported voxels
     notes    list of sentences on how to use the files
-    facts    dict of the numbers in the notes. A value is a number, or a list of three numbers. Counts
-             and sizes are integers.
+    facts    dict of the numbers in the notes. A value is a number, or a list of three numbers.
+             Counts and sizes are integers.
     """
 
     files: list[str]
