@@ -1,24 +1,27 @@
-#include "core/format/global/diff.h"
-
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "cli/output.h"
+#include "cli/selection_options.h"
+#include "cli/terminal/progress_bar.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
+#include "query/combine/count_different.h"
 
 namespace voxdag::cli {
 namespace {
 
 struct DiffCommand {
   std::string a, b;
+  std::string memory, work;
   unsigned threads = default_threads();
   bool color = false;
+  bool quiet = false;
   bool json = false;
 };
 
@@ -51,8 +54,13 @@ void print_colors(const voxdag_reader::File& a, const voxdag_reader::File& b,
 
 void run(const DiffCommand& command, CommandContext& context) {
   const auto a = open_global_file(command.a), b = open_global_file(command.b);
-  MemoryBudget budget(~uint64_t{0});
-  const DiffReport report = diff_global_files(*a, *b, command.threads, budget, context.cancel);
+  query::CountDifferentSpec spec;
+  spec.threads = command.threads;
+  spec.memory_bytes = memory_limit(command.memory);
+  spec.work_prefix = work_prefix(command.a, command.work);
+  const auto progress = make_progress_bar(command.quiet);
+  const auto [report, work_bytes] =
+      query::count_different(*a, *b, spec, context.files, *progress, context.cancel);
   std::optional<ColorDiff> colors;
   if (command.color) colors = diff_colors(*a, *b, command.threads, context.cancel);
   const bool same_colors =
@@ -63,7 +71,9 @@ void run(const DiffCommand& command, CommandContext& context) {
                                 {"voxels_a", a->voxels()},
                                 {"voxels_b", b->voxels()},
                                 {"only_a", report.only_a},
-                                {"only_b", report.only_b}};
+                                {"only_b", report.only_b},
+                                {"work_bytes", work_bytes},
+                                {"peak_rss_bytes", peak_resident_bytes()}};
     if (colors) json["colors"] = colors_json(*a, *b, *colors);
     print_json(json);
     return;
@@ -83,7 +93,13 @@ void declare(Command& command, DiffCommand& state) {
   command.option("a", state.a, "a .vdag file").required();
   command.option("b", state.b, "another .vdag file on the same grid").required();
   command.flag("--color", state.color, "also compare the colors of cells that both files have");
+  command.option("--memory", state.memory,
+                 "memory for tables and for mapped pages of the files; default: half the RAM");
+  command.option("--work", state.work,
+                 "folder for temporary files if --memory is not sufficient; default: the folder of "
+                 "the file A");
   command.threads_option(state.threads);
+  command.quiet_flag(state.quiet);
   command.json_flag(state.json);
 }
 

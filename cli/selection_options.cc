@@ -61,6 +61,11 @@ uint64_t memory_limit(const std::string& text) {
   return bytes;
 }
 
+std::string work_prefix(const std::string& path, const std::string& work) {
+  if (work.empty()) return path + ".work-";
+  return work + "/" + path.substr(path.rfind('/') + 1) + ".work-";
+}
+
 void SelectionOptions::declare(Command& command) {
   const Option region_option = command.option(
       "--region", region,

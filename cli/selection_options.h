@@ -25,5 +25,8 @@ struct SelectionOptions {
 // Parses the value of --memory and returns bytes; "" means half of the machine's memory. Throws
 // Error{kInvalidInput} for less than 64 MiB.
 uint64_t memory_limit(const std::string& text);
+// Returns the beginning of the paths of temporary folders: in the folder `work` or, if it is empty,
+// next to the file `path`.
+std::string work_prefix(const std::string& path, const std::string& work);
 
 }  // namespace voxdag::cli

@@ -152,12 +152,6 @@ void check_radius(const VerifyCommand& command) {
                                             ", with --solid enclosed");
 }
 
-// Returns the beginning of the paths of temporary folders.
-std::string work_prefix(const VerifyCommand& command) {
-  if (command.work.empty()) return command.path + ".work-";
-  return command.work + "/" + command.path.substr(command.path.rfind('/') + 1) + ".work-";
-}
-
 void run(const VerifyCommand& command, CommandContext& context) {
   check_radius(command);
   const auto file = open_global_file(command.path);
@@ -166,7 +160,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const uint64_t memory_bytes = memory_limit(command.memory);
   MemoryBudget budget(memory_bytes);
   PageLimit pages(*file, memory_bytes, std::min(PageLimit::kIntervalBytes, memory_bytes / 8));
-  VerifyScratch scratch(context.files, work_prefix(command));
+  VerifyScratch scratch(context.files, work_prefix(command.path, command.work));
   std::optional<Sample> sample;
   watched.run([&] {
     verify_global_file(*file, command.threads, budget, *progress, context.cancel,

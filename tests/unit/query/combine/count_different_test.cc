@@ -1,0 +1,119 @@
+// Compares the voxels of small files, with lists in scratch files.
+#include "query/combine/count_different.h"
+
+#include "tests/support/error_of.h"
+#include "tests/support/faulty_files.h"
+#include "tests/unit/query/combine/combine_fixture.h"
+
+namespace voxdag::query {
+namespace {
+
+class CountDifferent : public Combine {
+ protected:
+  // With lists of at most `list_bytes`.
+  CountDifferentReport count(uint64_t list_bytes, FileSystem& files = system_files()) {
+    const auto a = open_global_file(path("a")), b = open_global_file(path("b"));
+    CountDifferentSpec spec;
+    spec.memory_bytes = uint64_t{64} << 20;
+    spec.work_prefix = path("a.work-");
+    spec.list_bytes = list_bytes;
+    return count_different(*a, *b, spec, files, warnings_, never_);
+  }
+};
+
+uint64_t count_of(const oracle::Voxels& voxels) {
+  uint64_t count = 0;
+  for (int x = 0; x < voxels.edge(); ++x)
+    for (int y = 0; y < voxels.edge(); ++y)
+      for (int z = 0; z < voxels.edge(); ++z) count += voxels.at(x, y, z);
+  return count;
+}
+
+// With and without scratch files, the counts equal a comparison voxel by voxel. The hash bits of
+// the two files differ. Temporary files are removed.
+TEST_F(CountDifferent, EqualsAComparisonOfVoxels) {
+  for (const int edge : {4, 8, 64})
+    for (uint64_t seed = 0; seed < 6; ++seed) {
+      SCOPED_TRACE("edge " + std::to_string(edge) + ", seed " + std::to_string(seed));
+      const oracle::Voxels a = random_voxels(seed, edge), b = random_voxels(seed / 2, edge);
+      write_global(path("a"), a, 64);
+      write_global(path("b"), b, 9 + 7 * static_cast<uint32_t>(seed));
+      const CountDifferentReport small = count(256), large = count(~uint64_t{0});
+      EXPECT_EQ(small.voxels.only_a, count_of(combined_voxels(Operation::kMinus, a, b)));
+      EXPECT_EQ(small.voxels.only_b, count_of(combined_voxels(Operation::kMinus, b, a)));
+      EXPECT_EQ(small.voxels.only_a, large.voxels.only_a);
+      EXPECT_EQ(small.voxels.only_b, large.voxels.only_b);
+      EXPECT_EQ(large.work_bytes, 0u);
+      EXPECT_EQ(small.work_bytes > 0, edge == 64);
+      expect_files({"a", "b"});
+    }
+}
+
+// All voxels of a file differ from a file without voxels. Most of them are in equal cubes, which
+// occur at many places.
+TEST_F(CountDifferent, CountsEqualCubesAtAllPlaces) {
+  oracle::Voxels full(64);
+  fill(full, {0, 0, 0}, {64, 64, 63});
+  write_global(path("a"), full);
+  write_global(path("b"), oracle::Voxels(64));
+  EXPECT_EQ(count(256).voxels.only_a, 64u * 64 * 63);
+  EXPECT_EQ(count(256).voxels.only_b, 0u);
+}
+
+TEST_F(CountDifferent, FilesOfDifferentGridsAreRefused) {
+  write_global(path("a"), random_voxels(1, 64));
+  write_global(path("b"), random_voxels(1, 32));
+  for (const uint64_t list_bytes : {uint64_t{256}, ~uint64_t{0}})
+    EXPECT_EQ(error_of([&] { count(list_bytes); }).code(), ErrorCode::kInvalidInput);
+}
+
+// A damaged byte in any level of either file is detected. Temporary files are removed.
+TEST_F(CountDifferent, DamagedLevels) {
+  write_global(path("a"), random_voxels(7, 64));
+  write_global(path("b"), random_voxels(8, 64));
+  for (const char* name : {"a", "b"}) {
+    const std::string intact = bytes(name);
+    const auto file = open_global_file(path(name));
+    for (uint32_t l = 0; l <= file->brick_level(); ++l) {
+      SCOPED_TRACE(l);
+      std::string damaged = intact;
+      const size_t at = file->level(l).file_offset + 4 * (file->level(l).word_count / 2);
+      damaged[at] = static_cast<char>(damaged[at] ^ 4);
+      write_bytes(path(name), damaged);
+      EXPECT_EQ(error_of([&] { count(256); }).code(), ErrorCode::kCorrupt);
+      expect_files({"a", "b"});
+    }
+    write_bytes(path(name), intact);
+  }
+}
+
+// If the disk is full from the n-th write on, the error is kNoSpace. Temporary files are removed.
+TEST_F(CountDifferent, FullDisk) {
+  write_global(path("a"), random_voxels(7, 64));
+  write_global(path("b"), random_voxels(8, 64));
+  uint64_t failed = 0;
+  for (uint64_t at = 1;; at += 1 + at / 4) {
+    SCOPED_TRACE(at);
+    crash::FaultyFiles files({crash::Fault::kNoSpace, at});
+    try {
+      count(256, files);
+      break;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
+    }
+    expect_files({"a", "b"});
+    ++failed;
+  }
+  EXPECT_GT(failed, 5u);
+}
+
+TEST_F(CountDifferent, Canceled) {
+  write_global(path("a"), random_voxels(7, 64));
+  write_global(path("b"), random_voxels(8, 64));
+  never_.cancel();
+  EXPECT_EQ(error_of([&] { count(256); }).code(), ErrorCode::kCanceled);
+  expect_files({"a", "b"});
+}
+
+}  // namespace
+}  // namespace voxdag::query
