@@ -70,6 +70,7 @@ void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnF
 
 void OutputFile::check(FileSystem& files, const std::string& name, const std::string& input,
                        const IsOwnFile& is_own) const {
+  refuse_link(name);
   refuse_inputs(files, std::span(&name, 1), std::span(&input, 1));
   if (!force) refuse_foreign_file(files, name, is_own, " (--force replaces it)");
 }

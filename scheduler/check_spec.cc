@@ -126,6 +126,7 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
   const std::string partial = output + ".partial", report = report_path(spec.run);
   std::vector<std::string> outputs = {output, partial, OutputLock::path_of(output)};
   if (!report.empty()) outputs.insert(outputs.end(), {report, report + ".partial"});
+  for (const std::string& path : outputs) refuse_link(path);
   refuse_own_files(spec, scene, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
   // If the work folder has a job, voxdag created the partial file, even if its first bytes are

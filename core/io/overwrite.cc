@@ -34,6 +34,13 @@ std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string
   }
 }
 
+void refuse_link(const std::string& path) {
+  struct stat found {};
+  if (lstat(path.c_str(), &found) == 0 && S_ISLNK(found.st_mode))
+    throw Error(ErrorCode::kInvalidInput,
+                path + " is a symbolic link: expected a regular file, or a free name");
+}
+
 void refuse_inputs(FileSystem& files, std::span<const std::string> paths,
                    std::span<const std::string> inputs) {
   std::vector<FileIdentity> read;

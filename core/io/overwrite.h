@@ -16,6 +16,10 @@ namespace voxdag {
 // the call.
 std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path);
 
+// Throws Error{kInvalidInput} if `path` is a symbolic link. A rename to `path` would replace the
+// link instead of the file to which it points, and this file could be anywhere.
+void refuse_link(const std::string& path);
+
 // Throws Error{kInvalidInput} if one of `paths` is the same file as one of `inputs`. The files at
 // `paths` need not exist.
 void refuse_inputs(FileSystem& files, std::span<const std::string> paths,

@@ -12,6 +12,7 @@
 #include "core/base/page_buffer.h"
 #include "core/dag/node_hash.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/verify_checksums.h"
 #include "core/io/outputs/temporary_work.h"
 #include "query/combine/dag_input.h"
 #include "query/combine/spill.h"
@@ -181,6 +182,10 @@ CountDifferentReport count_different(const voxdag_reader::File& a, const voxdag_
                                      const CountDifferentSpec& spec, FileSystem& files,
                                      Progress& progress, const CancelToken& cancel) {
   expect_same_grid(a, b, "compared");
+  for (const voxdag_reader::File* file : {&a, &b}) {
+    PageLimit pages(*file, spec.memory_bytes);
+    verify_checksums(*file, spec.threads, pages, progress, cancel);
+  }
   if (const auto report = count_in_memory(a, b, spec, cancel)) return {*report, 0};
   return with_reader_errors([&] { return LevelCounts(a, b, spec, files, cancel).run(progress); });
 }

@@ -1,4 +1,5 @@
-// Counts the voxels in which two files of the same grid differ, in limited memory.
+// Counts the voxels in which two files of the same grid differ, in limited memory. First compares
+// both files with their checksums.
 //
 // If the files and a table of all compared pairs of nodes fit in memory, core/format/global/diff.h
 // compares them. Otherwise, both DAGs are descended together, level by level. Each distinct pair of

@@ -17,6 +17,7 @@ void refuse_impossible(FileSystem& files, const Outputs& outputs) {
       throw Error(ErrorCode::kInvalidInput,
                   "the output '" + path + "': expected the name of a file to write");
     const std::array<std::string, 2> names = {path, partial_path(path)};
+    for (const std::string& name : names) refuse_link(name);
     refuse_inputs(files, names, outputs.inputs);
     const std::string folder = parent_directory(path);
     if (!files.exists(folder))

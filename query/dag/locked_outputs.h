@@ -24,8 +24,8 @@ struct Outputs {
 class LockedOutputs {
  public:
   // Throws Error: kIo if another process holds the lock; kInvalidInput if an output has no name, is
-  // an input or is not a regular file, or if it would replace a file that is not empty and
-  // `replace` is false; kNotFound if an output's folder does not exist.
+  // an input, a symbolic link or not a regular file, or if it would replace a file that is not
+  // empty and `replace` is false; kNotFound if an output's folder does not exist.
   LockedOutputs(FileSystem& files, const Outputs& outputs);
   // Returns the file system through which the command writes its outputs. Unless `replace` is true,
   // this file system does not replace a file that another program creates at an output's path after

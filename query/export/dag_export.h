@@ -23,6 +23,8 @@ class DagExport {
   // Like export_dag(), but with this selection and output instead of the request's.
   ExportReport write(FileSystem& files, const Selection& selection, const std::string& output,
                      Progress& progress, const CancelToken& cancel);
+  // Compares the complete file with its checksums, at the first call. write() also calls it.
+  void verify(Progress& progress, const CancelToken& cancel);
   // True if an export of the selection has contents: a set cell, or for a level set, a set cell at
   // a distance of at most the band's width (level_set/narrow_band.h).
   bool has_contents(const Selection& selection) const;
@@ -41,6 +43,7 @@ class DagExport {
   // which has no level set. Does nothing after a call that has not thrown.
   void require_inside(const CancelToken& cancel);
 
+  bool is_verified_ = false;         // set by verify()
   bool has_inside_ = false;          // set by require_inside()
   std::optional<TurnedDag> turned_;  // made by the first write() if turn_ changes the axes
   std::optional<FilledDag> filled_;  // filled DAG of the last written grid, for --outside

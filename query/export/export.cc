@@ -6,7 +6,9 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/base/process_limits.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/verify_checksums.h"
 #include "core/format/global/watched_file.h"
 #include "query/dag/locked_outputs.h"
 #include "query/export/dag_export.h"
@@ -127,6 +129,13 @@ DagExport::DagExport(const voxdag_reader::File& file, const ExportRequest& reque
   check_export_options(*request.format, request.options);
 }
 
+void DagExport::verify(Progress& progress, const CancelToken& cancel) {
+  if (is_verified_) return;
+  PageLimit pages(file_, request_.memory_bytes);
+  verify_checksums(file_, default_threads(), pages, progress, cancel);
+  is_verified_ = true;
+}
+
 bool DagExport::has_contents(const Selection& selection) const {
   if (request_.options.grid == GridKind::kSdf)
     return has_band(dag_, selection, request_.options.band_width());
@@ -160,6 +169,7 @@ ExportReport DagExport::write(FileSystem& files, const Selection& selection,
   const WatchedFile watched(file_);
   Selection turned = selection;
   turned.region = turn_.turned(selection.region, int64_t{1} << selection.grid_levels);
+  const std::function<void()> verified = [&] { verify(progress, cancel); };
   const auto write = [&] {
     if (!turn_.is_none() && !turned_ && !dag_.empty())
       turned_.emplace(dag_, turn_, file_.path(), budget_, cancel);
@@ -169,6 +179,7 @@ ExportReport DagExport::write(FileSystem& files, const Selection& selection,
                         file_,
                         dag,
                         watched,
+                        verified,
                         turned,
                         output,
                         paths.back(),

@@ -23,7 +23,8 @@ struct ExportJob {
   const voxdag_reader::File& file;
   const DagView& dag;  // the file's DAG in turned axes (axis_turn.h); not empty
   const WatchedFile& watched;
-  Selection selection;  // in turned axes
+  const std::function<void()>& verify;  // compares the file with its checksums
+  Selection selection;                  // in turned axes
   std::string output;
   std::string second_output;  // name of the second file, for formats with two files
   bool has_colors;            // write colors, if the format supports them
@@ -56,12 +57,15 @@ struct ExportJob {
   }
 };
 
-// Reports a stage of the export's progress. Every 4096th call of advance() reports, and checks for
-// cancellation. The destructor ends the stage.
+// Reports a stage of the export's progress. The stage "export" first compares the input file with
+// its checksums: before it reads the file for the output, but after the checks of limits, because a
+// format that cannot store a huge file must refuse it without reading it. Every 4096th call of
+// advance() reports, and checks for cancellation. The destructor ends the stage.
 class ExportStage {
  public:
   ExportStage(const ExportJob& job, std::string_view name, uint64_t total, std::string_view unit)
       : job_(job) {
+    if (name == "export") job.verify();
     job.progress.begin_stage(name, total, unit);
   }
   ExportStage(const ExportStage&) = delete;

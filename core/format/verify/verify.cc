@@ -9,9 +9,9 @@
 #include "core/base/host_device.h"
 #include "core/base/parallel_for.h"
 #include "core/color/cell_values.h"
-#include "core/format/global/checked_blocks.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/verify_checksums.h"
 #include "core/format/verify/checked_level.h"
 #include "core/format/verify/verify_colors.h"
 #include "core/format/verify/verify_nodes.h"
@@ -22,8 +22,6 @@ using namespace global_layout;
 
 namespace {
 
-constexpr uint64_t kBlocksPerItem = 64;  // checksum blocks, 4 MiB together
-
 class Verifier {
  public:
   Verifier(const VerifyTask& task, uint64_t narrow_words)
@@ -31,7 +29,7 @@ class Verifier {
 
   void run() {
     check_header();
-    check_blocks();
+    verify_checksums(file_, task_.threads, task_.pages, task_.progress, task_.cancel);
     check_padding();
     verify_nodes(task_);
     verify_colors(file_, task_.threads, task_.progress, task_.cancel, task_.pages);
@@ -48,7 +46,6 @@ class Verifier {
   void check_header() const;
   void check_attributes(bool has_attributes) const;
   void check_section(size_t entry, Attribute attribute) const;
-  void check_blocks();
   void check_padding() const;
   void check_zeros(uint64_t begin, uint64_t end, const std::string& what) const;
 
@@ -161,25 +158,6 @@ void Verifier::check_section(size_t entry, Attribute attribute) const {
   }
   check_zeros(end, round_up_to_page(end), "padding after the " + plural);
   check_zeros(entry + kAttributeReservedAt, entry + kAttributeEntryBytes, "a reserved byte");
-}
-
-void Verifier::check_blocks() {
-  const uint64_t bytes = file_.checksum_table_offset() - kPageBytes;
-  const CheckedBlocks checked(file_);
-  const uint64_t blocks = checked.count();
-  task_.progress.begin_stage("verify checksums", bytes, "bytes");
-  parallel_for(task_.threads, (blocks + kBlocksPerItem - 1) / kBlocksPerItem,
-               [&](unsigned, size_t item) {
-                 const uint64_t first = item * kBlocksPerItem;
-                 const uint64_t end = std::min(first + kBlocksPerItem, blocks);
-                 for (uint64_t block = first; block < end; ++block) checked.compare(block);
-                 const uint64_t read =
-                     std::min(end * kChecksumBlockBytes, bytes) - first * kChecksumBlockBytes;
-                 task_.progress.advance(read);
-                 task_.pages.touch(read);
-                 task_.cancel.check();
-               });
-  task_.progress.end_stage();
 }
 
 void Verifier::check_padding() const {

@@ -106,6 +106,7 @@ class ChunkWriter {
       : files_(files), file_(file), request_(request), dag_(file, request.request) {}
 
   ChunksReport run(Progress& progress, const CancelToken& cancel) {
+    dag_.verify(progress, cancel);
     std::vector<std::vector<Chunk>> levels;
     uint64_t count = 0;
     const bool is_level_set = request_.request.options.grid == GridKind::kSdf;

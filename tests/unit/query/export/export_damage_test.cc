@@ -11,6 +11,7 @@
 #include "query/export/export_job.h"
 #include "tests/support/audience_guard.h"
 #include "tests/support/temporary_folder.h"
+#include "tests/unit/core/format/color/colored_files.h"
 #include "tests/unit/query/export/corners.h"
 
 namespace voxdag::query {
@@ -46,6 +47,8 @@ class ExportDamage : public testing::TestWithParam<const char*> {
   TemporaryFolder folder_;
 };
 
+// A file with damaged words whose checksums are correct is refused or exported. Without correct
+// checksums, it is always refused.
 TEST_P(ExportDamage, IsAnErrorOrHarmless) {
   const std::string path = folder_.file("a.vdag");
   write_corners(path, kDamagedLevels);
@@ -66,8 +69,11 @@ TEST_P(ExportDamage, IsAnErrorOrHarmless) {
     const uint32_t value =
         round % 3 ? values[random() % std::size(values)] : static_cast<uint32_t>(random());
     std::memcpy(damaged.data() + at, &value, sizeof value);
-    std::ofstream(path, std::ios::binary).write(damaged.data(), std::ssize(damaged));
     SCOPED_TRACE(testing::Message() << "word at byte " << at << " is " << value);
+    write_bytes(path, damaged);
+    EXPECT_EQ(is_refused(path), damaged != intact);
+    put_checksums_right(damaged);
+    write_bytes(path, damaged);
     refused += is_refused(path);
   }
   EXPECT_GT(refused, 5);
