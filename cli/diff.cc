@@ -11,7 +11,7 @@
 #include "core/base/text/printable.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
-#include "query/combine/count_different.h"
+#include "query/verify/count_different.h"
 
 namespace voxdag::cli {
 namespace {

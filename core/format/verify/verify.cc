@@ -11,8 +11,8 @@
 #include "core/color/cell_values.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify_checksums.h"
 #include "core/format/verify/checked_level.h"
+#include "core/format/verify/verify_checksums.h"
 #include "core/format/verify/verify_colors.h"
 #include "core/format/verify/verify_nodes.h"
 

@@ -1,5 +1,5 @@
 // Compares the voxels of small files, with lists in scratch files.
-#include "query/combine/count_different.h"
+#include "query/verify/count_different.h"
 
 #include "tests/support/error_of.h"
 #include "tests/support/faulty_files.h"

@@ -1,4 +1,4 @@
-#include "core/format/global/verify_checksums.h"
+#include "core/format/verify/verify_checksums.h"
 
 #include <algorithm>
 #include <cstdint>

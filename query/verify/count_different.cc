@@ -1,4 +1,4 @@
-#include "query/combine/count_different.h"
+#include "query/verify/count_different.h"
 
 #include <algorithm>
 #include <bit>
@@ -12,7 +12,7 @@
 #include "core/base/page_buffer.h"
 #include "core/dag/node_hash.h"
 #include "core/format/global/open_global.h"
-#include "core/format/global/verify_checksums.h"
+#include "core/format/verify/verify_checksums.h"
 #include "core/io/outputs/temporary_work.h"
 #include "query/combine/dag_input.h"
 #include "query/combine/spill.h"
