@@ -33,8 +33,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
   const PreparedScene scene = prepare_scene(full, source, budget, clock, context, no_checkpoints);
   seed_of(full.geometry, scene.state.grid);  // throws for a point outside the grid
-  Estimate estimate =
-      estimate_build(full.geometry, scene, source, {context, full.run.threads, budget});
+  Estimate estimate = estimate_build(full, scene, source, {context, full.run.threads, budget});
   if (estimate.solid && estimate.solid->warning)
     context.progress.warn_of_input(*estimate.solid->warning);
   estimate.free_disk = context.files.free_space(work.path());

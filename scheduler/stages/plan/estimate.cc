@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/base/error.h"
+#include "core/base/text.h"
 #include "core/dag/brick.h"
 #include "core/fields/json_fields.h"
 #include "core/fields/json_text.h"
@@ -14,6 +15,7 @@
 #include "scheduler/solid/solid_report.h"
 #include "scheduler/spec/memory_plan.h"
 #include "scheduler/stages/plan/pilots.h"
+#include "scheduler/stages/plan/subvolume_costs.h"
 
 namespace voxdag {
 namespace {
@@ -32,10 +34,6 @@ constexpr double kSpreadPerDoubling = 1.12;
 // is at most kMaxBytesPerNode.
 constexpr double kMaxBytesPerNode = 23;
 constexpr double kBytesGrowthPerDoubling = 1.04;
-// Measured on real scenes: nodes of all artifacts per node of the global DAG, and compressed bytes
-// of an artifact per node.
-constexpr double kArtifactNodesPerUnique = 1.5;
-constexpr double kArtifactBytesPerNode = 16;
 // Upper bound of the bytes of a node, in an artifact or in the global file. Even an uncompressed
 // node takes fewer bytes.
 constexpr double kMaxDiskBytesPerNode = 40;
@@ -145,7 +143,7 @@ struct SolidNeeds {
   EstimateRange disk_bytes, memory_bytes;
 };
 SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scene,
-                       const EstimateRange& artifact_nodes, const StageContext& context) {
+                       const SubvolumeCosts& costs, const StageContext& context) {
   const unsigned threads = context.threads;
   if (solid_rule_of(options) != SolidRule::kNone) {
     const PlannedRows rows = planned_rows(scene);
@@ -154,8 +152,8 @@ SolidNeeds solid_needs(const GeometryOptions& options, const PreparedScene& scen
   const double subvolumes = static_cast<double>(std::max<size_t>(scene.plan.size(), 1));
   const bool keeps_labels = MemoryPlan::kept_label_bytes(context.budget.limit()) != 0;
   const double in_memory = keeps_labels ? 1 : std::min(1.0, threads / subvolumes);
-  return {artifact_copies(options) * kArtifactBytesPerNode * artifact_nodes,
-          kEncloseBytesPerNode * in_memory * artifact_nodes};
+  return {artifact_copies(options) * costs.artifact_bytes,
+          kEncloseBytesPerNode * in_memory * costs.artifact_nodes};
 }
 
 // Extrapolates the interior of a solid. Copies the counts of sample rows from the finer pilot.
@@ -183,8 +181,9 @@ SolidEstimate estimate_solid(const GeometryOptions& options, const std::vector<P
 
 // Returns an upper bound of the disk space of a build, without building pilots. The bound is
 // several times the actual size.
-double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene,
-                      BuildScene& source, const StageContext& context) {
+double max_disk_bytes(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
+                      const StageContext& context) {
+  const GeometryOptions& options = spec.geometry;
   // A triangle touches about A + E + 1 cubes, where A follows from its area and E from its extents
   // (see expected_work()). So it touches about A/4 + E/2 + 1 cubes of twice the edge. The sum over
   // all levels is at most twice the number of its bricks, plus one cube per level.
@@ -192,9 +191,10 @@ double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene
   for (const SubvolumePlan& subvolume : scene.plan) bricks += subvolume.weight;
   const double triangles = static_cast<double>(scene.state.counts.triangles);
   const double octree_nodes = 2 * bricks + scene.state.grid.levels * triangles;
-  double geometry = kMaxDiskBytesPerNode * octree_nodes + triangles_on_disk(scene).high;
-  if (options.solid == SolidName::kEnclosed)
-    geometry += artifact_copies(options) * kMaxDiskBytesPerNode * octree_nodes;
+  const double subvolumes = expected_subvolumes(scene, spec.run.subvolume_edge);
+  const double dags = kMaxDiskBytesPerNode * octree_nodes + max_bytes_around_artifacts(subvolumes);
+  double geometry = dags + triangles_on_disk(scene).high;
+  if (options.solid == SolidName::kEnclosed) geometry += artifact_copies(options) * dags;
   if (solid_rule_of(options) != SolidRule::kNone) geometry += 2 * planned_rows(scene).all;
   if (!options.attributes.any()) return geometry;
   const uint32_t color_levels = levels_of_resolution(options.color_resolution);
@@ -209,15 +209,11 @@ double max_disk_bytes(const GeometryOptions& options, const PreparedScene& scene
 
 void check_disk(const char* what, const EstimateRange& bytes, const std::string& folder,
                 uint64_t free, Progress& progress) {
-  const auto gigabytes = [](double count) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.2f GB", count / 1e9);
-    return std::string(text);
-  };
+  const auto size = [](double count) { return size_text(static_cast<uint64_t>(count)); };
   const double free_bytes = static_cast<double>(free);
-  const std::string need = std::string(what) + " is estimated to need " + gigabytes(bytes.low) +
-                           " to " + gigabytes(bytes.high) + " of disk at its peak, but " + folder +
-                           " has " + gigabytes(free_bytes) + " free";
+  const std::string need = std::string(what) + " is estimated to need " + size(bytes.low) + " to " +
+                           size(bytes.high) + " of disk at its peak, but " + folder + " has " +
+                           size(free_bytes) + " free";
   if (bytes.low > free_bytes) throw DoesNotFit(need + ": expected more free space");
   if (bytes.high > free_bytes) progress.warn(need);
 }
@@ -256,8 +252,9 @@ EstimateRange file_size(const EstimateRange& node_bytes, uint32_t grid_levels) {
 
 }  // namespace
 
-Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
-                        BuildScene& source, const StageContext& context) {
+Estimate estimate_build(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
+                        const StageContext& context) {
+  const GeometryOptions& options = spec.geometry;
   const MemoryBudget& budget = context.budget;
   Estimate estimate;
   estimate.triangles = scene.state.counts.triangles;
@@ -288,9 +285,10 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
       std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMaxBytesPerNode));
   estimate.file_bytes = file_size(bytes * estimate.dag_nodes, scene.state.grid.levels);
 
-  const EstimateRange artifact_nodes = kArtifactNodesPerUnique * estimate.dag_nodes;
-  estimate.disk_bytes =
-      estimate.file_bytes + kArtifactBytesPerNode * artifact_nodes + triangles_on_disk(scene);
+  const SubvolumeCosts costs =
+      estimate_subvolumes(expected_subvolumes(scene, spec.run.subvolume_edge),
+                          estimate.svo_nodes.likely, estimate.dag_nodes);
+  estimate.disk_bytes = estimate.file_bytes + costs.artifact_bytes + triangles_on_disk(scene);
   // Adds the merge's file and the nodes that are being reordered. Both have about the size of the
   // output file.
   if (options.order != OrderName::kHash)
@@ -300,9 +298,10 @@ Estimate estimate_build(const GeometryOptions& options, const PreparedScene& sce
       std::max(scene.state.counts.triangles, scene.triangles->count(kSceneBin));
   const double triangle_bytes =
       static_cast<double>(scene.triangles->record_bytes()) * static_cast<double>(records);
-  estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes);
+  estimate.memory_bytes =
+      kMemoryBytesPerNode * estimate.dag_nodes + exactly(triangle_bytes) + costs.memory_bytes;
   if (is_solid) {
-    const SolidNeeds needs = solid_needs(options, scene, artifact_nodes, context);
+    const SolidNeeds needs = solid_needs(options, scene, costs, context);
     estimate.disk_bytes = estimate.disk_bytes + needs.disk_bytes;
     estimate.memory_bytes = estimate.memory_bytes + needs.memory_bytes;
     estimate.solid = estimate_solid(options, pilots, doublings);
@@ -332,9 +331,8 @@ bool check_disk_space(const BuildSpec& spec, const PreparedScene& scene, BuildSc
   const uint64_t free_bytes =
       std::min(context.files.free_space(work_folder), context.files.free_space(output_folder));
   const StageContext stage{context, spec.run.threads, budget};
-  if (max_disk_bytes(spec.geometry, scene, source, stage) < static_cast<double>(free_bytes))
-    return false;
-  const Estimate estimate = estimate_build(spec.geometry, scene, source, stage);
+  if (max_disk_bytes(spec, scene, source, stage) < static_cast<double>(free_bytes)) return false;
+  const Estimate estimate = estimate_build(spec, scene, source, stage);
   check_estimate(estimate, context.files, work_folder, output_folder, context.progress);
   return true;
 }

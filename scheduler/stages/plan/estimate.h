@@ -54,8 +54,8 @@ struct Estimate {
 
 // Estimates the build of a prepared scene without changing it. The pilots run on this thread,
 // within the budget.
-Estimate estimate_build(const GeometryOptions& options, const PreparedScene& scene,
-                        BuildScene& source, const StageContext& context);
+Estimate estimate_build(const BuildSpec& spec, const PreparedScene& scene, BuildScene& source,
+                        const StageContext& context);
 
 // Checks before a build that the disk has space for it, including the decoded images. Throws
 // Error{kNoSpace} if the build cannot fit, and warns if it is possible that it does not fit. Does

@@ -144,6 +144,7 @@ TEST_F(BuildProtection, SmallBuildsAreRefusedByTheEstimateToo) {
   const Error error = error_of([&] { run_build(small, context()); });
   EXPECT_EQ(error.code(), ErrorCode::kNoSpace);
   EXPECT_NE(error.message().find("the build is estimated"), std::string::npos) << error.message();
+  EXPECT_NE(error.message().find(" has 1000 B free"), std::string::npos) << error.message();
   EXPECT_EQ(plan_build(small, context()).free_disk, 1000u);
 }
 
