@@ -173,11 +173,13 @@ uint64_t cgroup_cpus(const std::string& membership, const std::string& mount) {
       });
 }
 
-uint64_t default_memory() {
+uint64_t usable_memory() {
   const uint64_t ram = static_cast<uint64_t>(sysconf(_SC_PHYS_PAGES)) *
                        static_cast<uint64_t>(sysconf(_SC_PAGE_SIZE));
-  return std::max(kMinMemory, std::min(ram, cgroup_memory(own_membership(), kCgroupMount)) / 2);
+  return std::min(ram, cgroup_memory(own_membership(), kCgroupMount));
 }
+
+uint64_t default_memory() { return std::max(kMinMemory, usable_memory() / 2); }
 
 unsigned default_threads() {
   // Computed once, because the computation reads up to a dozen files, and several commands declare

@@ -31,7 +31,9 @@ namespace voxdag {
 // The smallest accepted value of --memory, in bytes.
 inline constexpr uint64_t kMinMemory = uint64_t{64} << 20;
 
-// Returns half of the memory that RAM and cgroup limits allow, but at least kMinMemory, in bytes.
+// Returns the memory that RAM and cgroup limits allow, in bytes.
+uint64_t usable_memory();
+// Returns half of usable_memory(), but at least kMinMemory, in bytes.
 uint64_t default_memory();
 // Returns the lowest memory limit, in bytes, of the cgroups in `membership` and of their ancestors.
 // `membership` is the text of /proc/self/cgroup. The cgroups are version 1 or 2 and are mounted at

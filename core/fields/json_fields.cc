@@ -38,6 +38,10 @@ void refuse(const std::string& name, const std::string& expected, const FieldJso
   throw FieldError(name, expected + ", not " + shown(found));
 }
 
+void refuse_repeated(const std::string& name) {
+  refuse(name.substr(0, kMaxShownBytes), "the member once; an object has it twice");
+}
+
 bool whole_number(const FieldJson& json, const std::function<bool(uint64_t)>& take_unsigned,
                   const std::function<bool(int64_t)>& take_signed) {
   constexpr double kExact = 0x1p53;

@@ -24,6 +24,8 @@ namespace json_fields {
 // Like the other refuse(), but the message also shows the refused value, shortened.
 [[noreturn]] void refuse(const std::string& name, const std::string& expected,
                          const FieldJson& found);
+// Refuses a member that an object has twice (repeated_member() in json_text.h).
+[[noreturn]] void refuse_repeated(const std::string& name);
 // Reads a whole number, which may be written as 64.0. Calls `take_unsigned` or `take_signed`,
 // depending on the type of the JSON number, and returns the result of this call. Returns false if
 // `json` is not a whole number.

@@ -1,6 +1,8 @@
 #include "core/fields/json_text.h"
 
 #include <nlohmann/json.hpp>
+#include <set>
+#include <vector>
 
 namespace voxdag {
 
@@ -27,6 +29,22 @@ Json parse_json(std::string_view text) {
 template <class Json>
 Json try_parse_json(std::string_view text) {
   return Json::parse(text, nullptr, false);
+}
+
+std::optional<std::string> repeated_member(std::string_view text) {
+  using Json = nlohmann::json;
+  std::vector<std::set<std::string>> open;  // names of the objects around the parser's position
+  std::optional<std::string> repeated;
+  const auto see = [&](int, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::object_start) open.emplace_back();
+    if (event == Json::parse_event_t::object_end) open.pop_back();
+    if (event == Json::parse_event_t::key &&
+        !open.back().insert(parsed.get_ref<const std::string&>()).second && !repeated)
+      repeated = parsed.get<std::string>();
+    return true;
+  };
+  const bool is_json = !Json::parse(text, see, false).is_discarded();
+  return is_json ? repeated : std::nullopt;
 }
 
 template std::string json_text(const nlohmann::json&, int);

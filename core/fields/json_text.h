@@ -4,6 +4,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -28,5 +29,9 @@ Json parse_json(std::string_view text);
 // value.
 template <class Json>
 Json try_parse_json(std::string_view text);
+
+// Returns the first name that occurs twice in one object of the text, which the parsers accept.
+// Returns nullopt if there is none, or if the text is not JSON.
+std::optional<std::string> repeated_member(std::string_view text);
 
 }  // namespace voxdag

@@ -6,6 +6,7 @@
 #include "core/fields/json_fields.h"
 #include "core/fields/json_text.h"
 #include "scheduler/cluster/cluster.h"
+#include "scheduler/spec/build_fields.h"
 #include "server/base/http_url.h"
 #include "server/http/connection/listener.h"
 
@@ -13,6 +14,10 @@ namespace voxdag::server {
 namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
+// Minimum limit of a request's header and of JSON bodies. Smaller limits would refuse most
+// requests.
+constexpr uint64_t kMinMessageBytes = 1024;
+constexpr int kMinNice = -20, kMaxNice = 19;
 constexpr size_t kMaxWebhookPrefixes = 64;
 constexpr double kMaxWebhookTimeoutS = 300;
 constexpr const char* kExpectedOrigin =
@@ -26,6 +31,53 @@ bool is_origin(const std::string& text) {
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-:[]";
   return host > 0 && host < text.size() &&
          text.find_first_not_of(kAllowed, host) == std::string::npos;
+}
+
+// True if the text can be the host, without a port, of a Host header field.
+bool is_host(const std::string& text) {
+  constexpr const char* kAllowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_";
+  if (text.starts_with('[')) return text.ends_with(']') && text.size() > 2;
+  return !text.empty() && text.find_first_not_of(kAllowed) == std::string::npos;
+}
+
+// Refuses numbers outside their ranges. Checks them here and not in fields(), because the messages
+// of fields() do not name the object of a member.
+void check_ranges(const ServerConfig& config) {
+  const auto check = [](const char* name, auto value, bool fits, const std::string& expected) {
+    if (fits) return;
+    throw Error(ErrorCode::kInvalidInput, std::string(name) + " is " +
+                                              number_text(static_cast<double>(value)) +
+                                              ": expected " + expected);
+  };
+  const auto at_least = [&](const char* name, auto value, uint64_t least) {
+    check(name, value, value >= least, "at least " + std::to_string(least));
+  };
+  const auto above_zero = [&](const char* name, double value) {
+    check(name, value, value > 0, "more than 0");
+  };
+  const JobLimits& jobs = config.jobs;
+  at_least("jobs.max_concurrent", jobs.max_concurrent, 1);
+  at_least("jobs.max_attempts", jobs.max_attempts, 1);
+  at_least("jobs.max_queued", jobs.max_queued, 1);
+  above_zero("jobs.plan_timeout_s", jobs.plan_timeout_s);
+  check("jobs.threads", jobs.threads, jobs.threads <= kMaxOptionThreads,
+        "0 (all cores) to " + std::to_string(kMaxOptionThreads));
+  check("jobs.nice", jobs.nice, jobs.nice >= kMinNice && jobs.nice <= kMaxNice,
+        std::to_string(kMinNice) + " to " + std::to_string(kMaxNice));
+  const TransferLimits& transfers = config.transfers;
+  at_least("transfers.max_scene_size", transfers.max_scene_bytes, 1);
+  at_least("transfers.max_body_size", transfers.max_body_bytes, kMinMessageBytes);
+  at_least("transfers.max_concurrent", transfers.max_concurrent, 1);
+  at_least("transfers.max_per_client", transfers.max_per_client, 1);
+  const auto& connections = config.http.limits;
+  at_least("connections.max_connections", connections.max_connections, 8);
+  at_least("connections.max_per_client", connections.max_per_client, 1);
+  at_least("connections.max_header_size", connections.max_header_bytes, kMinMessageBytes);
+  above_zero("connections.header_timeout_s", connections.header_timeout_s);
+  above_zero("connections.idle_timeout_s", connections.idle_timeout_s);
+  above_zero("connections.grace_s", connections.grace_s);
+  above_zero("connections.min_bytes_per_s", connections.min_bytes_per_s);
 }
 
 void check_webhooks(const WebhookOptions& webhooks) {
@@ -150,7 +202,9 @@ void fields(Visitor& visit, ServerConfig& c) {
 void read_config(FileSystem& files, const std::string& path, ServerConfig& config) {
   const std::string text = read_small_file(files, path, kMaxConfigBytes);
   try {
-    set_options(parse_json<FieldJson>(text), "the file", config);
+    const auto json = parse_json<FieldJson>(text);
+    if (const auto name = repeated_member(text)) json_fields::refuse_repeated(*name);
+    set_options(json, "the file", config);
   } catch (const nlohmann::json::exception& error) {
     throw Error(ErrorCode::kInvalidInput, path + " is not JSON (" + error.what() +
                                               "): expected a JSON object with the settings");
@@ -176,14 +230,14 @@ void check_config(const ServerConfig& config) {
              " without tokens: anybody who can reach this port could build and delete. Make a "
              "token file (voxdag token --role admin --name you >> tokens) and name it (--tokens "
              "FILE), or listen on 127.0.0.1");
-  expect(config.jobs.max_concurrent >= 1, "jobs.max_concurrent is 0: expected at least 1");
-  expect(config.jobs.max_attempts >= 1, "jobs.max_attempts is 0: expected at least 1");
-  expect(config.http.limits.max_connections >= 8,
-         "connections.max_connections is " + std::to_string(config.http.limits.max_connections) +
-             ": expected at least 8");
-  expect(config.http.limits.min_bytes_per_s > 0,
-         "connections.min_bytes_per_s is " + number_text(config.http.limits.min_bytes_per_s) +
-             ": expected more than 0");
+  check_ranges(config);
+  const uint64_t usable = usable_memory();
+  expect(config.jobs.memory_bytes <= usable,
+         "jobs.memory is " + size_text(config.jobs.memory_bytes) + ": expected at most " +
+             size_text(usable) + ", the memory that the service can use");
+  expect(config.exports.memory_bytes <= usable,
+         "exports.memory is " + size_text(config.exports.memory_bytes) + ": expected at most " +
+             size_text(usable) + ", the memory that the service can use");
   expect(config.jobs.memory_bytes == 0 ||
              config.jobs.memory_bytes / config.jobs.max_concurrent >= kMinMemory,
          "jobs.memory is " + size_text(config.jobs.memory_bytes) +
@@ -200,6 +254,10 @@ void check_config(const ServerConfig& config) {
     expect(root.starts_with('/'),
            "scene_roots: '" + root +
                "' is not an absolute path: expected the path of a folder that begins with /");
+  for (const std::string& host : config.hosts)
+    expect(is_host(host), "hosts: '" + host +
+                              "': expected a host name without a port, such as "
+                              "voxels.example.org or [2001:db8::1]");
   for (const std::string& origin : config.embed_origins)
     expect(is_origin(origin), "embed_origins: '" + origin + "': " + kExpectedOrigin);
   for (const std::string& origin : config.cors_origins)

@@ -109,7 +109,7 @@ void add_export_routes(Router& router) {
               .body = json_content("ExportRequest"),
               .answers = {{200, "the export that has this request", {json_content("Export")}},
                           {202, "the queued export", {json_content("Export")}}},
-              .problems = {404, 408, 409, 413, 415, 422, 507}},
+              .problems = {404, 408, 409, 413, 415, 422}},
              post_export);
   router.add({.method = "GET",
               .pattern = kExports,
@@ -135,7 +135,7 @@ void add_export_routes(Router& router) {
               .tag = "exports",
               .answers = {{202, "its process is being stopped", {json_content("Export")}},
                           {204, "deleted"}},
-              .problems = {404, 409, 507}},
+              .problems = {404, 409}},
              delete_export);
   router.add(download_route({.method = "GET",
                              .pattern = std::string(kExport) + "/files/{file}",

@@ -362,7 +362,7 @@ void add_list_routes(Router& router) {
               .body = json_content("JobRequest"),
               .answers = {{200, "the estimate of a dry run", {json_content("Plan")}},
                           {202, "the queued job", {json_content("Job")}, {kLocation, kReplayed}}},
-              .problems = {404, 408, 409, 413, 415, 422, 507}},
+              .problems = {404, 408, 409, 413, 415, 422}},
              post_job);
   router.add({.method = "GET",
               .pattern = kJobs,

@@ -286,7 +286,7 @@ void add_scene_routes(Router& router) {
               .answers = {{200, "the scene was replaced", body, headers},
                           {201, "the scene was created", body, headers},
                           {202, "the upload is not complete yet", body, headers}},
-              .problems = {408, 409, 413, 415, 507}},
+              .problems = {408, 409, 413, 415}},
              put_scene);
   router.add({.method = "DELETE",
               .pattern = scene,

@@ -17,6 +17,7 @@ FieldJson read_body(std::string_view body, Options& options) {
   if (json.is_discarded())
     throw RequestError(RequestError::Kind::kInvalid,
                        "the body is not JSON: expected a JSON object");
+  if (const auto name = repeated_member(body)) json_fields::refuse_repeated(*name);
   set_options(json, "the body", options);
   return json;
 }

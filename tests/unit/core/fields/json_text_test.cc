@@ -32,5 +32,11 @@ TEST(JsonTextTest, ReportsTextThatIsNotJson) {
   EXPECT_EQ(try_parse_json<ordered_json>("null"), ordered_json());
 }
 
+TEST(JsonTextTest, FindsARepeatedMember) {
+  EXPECT_EQ(repeated_member(R"({"a": {"b": 1, "b": 2}})"), "b");
+  EXPECT_EQ(repeated_member(R"([{"a": 1}, {"a": 1, "c": {"a": 2}}])"), std::nullopt);
+  EXPECT_EQ(repeated_member(R"({"a": 1, "a": )"), std::nullopt);
+}
+
 }  // namespace
 }  // namespace voxdag

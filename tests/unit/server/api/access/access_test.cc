@@ -199,6 +199,7 @@ TEST(Configs, ErrorsNameTheMember) {
       {"{\"jobs\": {\"memory\": \"many\"}}", "memory"},
       {"{\"jobs\": {\"max_concurrent\": -1}}", "'max_concurrent'"},
       {"{\"tls\": []}", "'tls'"},
+      {"{\"jobs\": {\"threads\": 1, \"threads\": 2}}", "'threads'"},
       {"{\"cluster\": {\"nodes\": 4}}", "'nodes'"},
       {"{\"scene_roots\": \"/x\"}", "'scene_roots'"}};
   for (const auto& [text, part] : texts) {
@@ -213,6 +214,57 @@ TEST(Configs, ErrorsNameTheMember) {
       EXPECT_NE(error.message().find(part), std::string::npos) << error.message();
     }
   }
+}
+
+// Each setting out of range is refused before the service starts, and the message names it.
+TEST(Configs, RangesAreChecked) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::string& member, const std::string& value) {
+    const auto [object, name] =
+        std::pair(member.substr(0, member.find('.')), member.substr(member.find('.') + 1));
+    const std::string text = object == member
+                                 ? "{\"" + member + "\": " + value + "}"
+                                 : "{\"" + object + "\": {\"" + name + "\": " + value + "}}";
+    write_file_atomically(system_files(), folder.file("c"), text);
+    ServerConfig config;
+    config.data_folder = "/tmp/x";
+    try {
+      read_config(system_files(), folder.file("c"), config);
+      check_config(config);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+      return error.message();
+    }
+    return std::string();
+  };
+  const std::pair<const char*, const char*> refused[] = {{"jobs.threads", "5000"},
+                                                         {"jobs.nice", "99"},
+                                                         {"jobs.nice", "-21"},
+                                                         {"jobs.memory", "\"100TiB\""},
+                                                         {"jobs.max_queued", "0"},
+                                                         {"jobs.max_attempts", "0"},
+                                                         {"jobs.plan_timeout_s", "0"},
+                                                         {"exports.memory", "\"100TiB\""},
+                                                         {"transfers.max_body_size", "0"},
+                                                         {"transfers.max_concurrent", "0"},
+                                                         {"transfers.max_scene_size", "0"},
+                                                         {"connections.max_header_size", "0"},
+                                                         {"connections.max_connections", "7"},
+                                                         {"connections.idle_timeout_s", "0"},
+                                                         {"hosts", "[\"\"]"},
+                                                         {"hosts", "[\"a:80\"]"}};
+  for (const auto& [member, value] : refused) {
+    const std::string message = refusal(member, value);
+    EXPECT_TRUE(message.starts_with(member)) << member << " " << value << ": " << message;
+    EXPECT_NE(message.find("expected"), std::string::npos) << message;
+  }
+  const std::pair<const char*, const char*> accepted[] = {
+      {"jobs.threads", "1024"},
+      {"jobs.nice", "19"},
+      {"connections.max_header_size", "1024"},
+      {"jobs.max_queued", "1"},
+      {"hosts", "[\"a.example\", \"[2001:db8::1]\"]"}};
+  for (const auto& [member, value] : accepted) EXPECT_EQ(refusal(member, value), "") << member;
 }
 
 // A configuration that listens on the network without tokens is rejected.
