@@ -22,10 +22,9 @@ namespace {
 
 constexpr uint64_t kMaxConfigBytes = uint64_t{1} << 20;
 
-// Returns the key of a line of a TOML or INI file: "threads" for `threads = 4`. Returns "" for
-// other lines, such as sections and comments.
+// Returns the key of a line of a TOML or INI file, without its comment: "threads" for `threads =
+// 4`. Returns "" for other lines.
 std::string config_key(std::string line) {
-  line.erase(std::min(line.find_first_of("#;"), line.size()));
   line.erase(std::min(line.find('='), line.size()));
   std::string key = CLI::detail::trim(line);
   CLI::detail::remove_quotes(key);
@@ -40,10 +39,19 @@ std::string config_key(std::string line) {
 // the last one would count.
 void check_config_keys(const std::string& path, const std::string& text, const CLI::App& command) {
   std::map<const CLI::Option*, size_t> lines;
+  long open = 0;  // brackets of an array that continues on the next line
   std::istringstream rest(text);
   std::string line;
   for (size_t number = 1; std::getline(rest, line); ++number) {
-    const std::string key = config_key(line);
+    line.erase(std::min(line.find_first_of("#;"), line.size()));
+    const bool is_item = open > 0;
+    const std::string trimmed = CLI::detail::trim_copy(line);
+    if (!is_item && trimmed.starts_with('[')) {
+      if (trimmed != "[default]") break;  // the keys of other sections are not options
+      continue;
+    }
+    open += std::ranges::count(line, '[') - std::ranges::count(line, ']');
+    const std::string key = is_item ? "" : config_key(line);
     const CLI::Option* const option =
         key.empty() ? nullptr : command.get_option_no_throw("--" + key);
     if (!option) continue;

@@ -11,6 +11,7 @@
 #include "core/base/text/printable.h"
 #include "core/format/global/diff_colors.h"
 #include "core/format/global/open_global.h"
+#include "core/format/global/watched_file.h"
 #include "query/verify/count_different.h"
 
 namespace voxdag::cli {
@@ -59,10 +60,17 @@ void run(const DiffCommand& command, CommandContext& context) {
   spec.memory_bytes = memory_limit(command.memory);
   spec.work_prefix = work_prefix(command.a, command.work);
   const auto progress = make_progress_bar(command.quiet);
-  const auto [report, work_bytes] =
-      query::count_different(*a, *b, spec, context.files, *progress, context.cancel);
+  const WatchedFile watched_a(*a), watched_b(*b);
+  query::CountDifferentReport counted;
   std::optional<ColorDiff> colors;
-  if (command.color) colors = diff_colors(*a, *b, command.threads, context.cancel);
+  const auto compare = [&] {
+    if (command.color) colors = diff_colors(*a, *b, command.threads, context.cancel);
+    counted = query::count_different(*a, *b, spec, context.files, *progress, context.cancel);
+    watched_a.check_readable();
+    watched_b.check_readable();
+  };
+  watched_a.run([&] { watched_b.run(compare); });
+  const DiffReport& report = counted.voxels;
   const bool same_colors =
       !colors || (colors->different_cells == 0 && a->color_levels() == b->color_levels());
   context.exit_status = report.same() && same_colors ? 0 : 1;
@@ -72,7 +80,7 @@ void run(const DiffCommand& command, CommandContext& context) {
                                 {"voxels_b", b->voxels()},
                                 {"only_a", report.only_a},
                                 {"only_b", report.only_b},
-                                {"work_bytes", work_bytes},
+                                {"work_bytes", counted.work_bytes},
                                 {"peak_rss_bytes", peak_resident_bytes()}};
     if (colors) json["colors"] = colors_json(*a, *b, *colors);
     print_json(json);

@@ -55,8 +55,7 @@ std::string find_work_folder(FileSystem& files, const std::string& path) {
   if (has_build(files, path)) return path;
   const std::string work_folder = path + ".work";
   if (has_build(files, work_folder)) return work_folder;
-  const auto file = open_if_there(files, path);
-  if (file && is_global_file(*file))
+  if (files.identify(path) && is_global_file(*files.open_read(path)))
     throw Error(ErrorCode::kNotFound,
                 path +
                     ": no build of this file is unfinished: expected a file with the work folder " +

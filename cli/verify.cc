@@ -159,7 +159,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   const auto progress = make_progress_bar(command.quiet);
   const uint64_t memory_bytes = memory_limit(command.memory);
   MemoryBudget budget(memory_bytes);
-  PageLimit pages(*file, memory_bytes, std::min(PageLimit::kIntervalBytes, memory_bytes / 8));
+  PageLimit pages(*file, memory_bytes);
   VerifyScratch scratch(context.files, work_prefix(command.path, command.work));
   std::optional<Sample> sample;
   watched.run([&] {

@@ -116,6 +116,10 @@ struct HttpClient::Impl {
                   "server " + url +
                       ": its certificate is not trusted, or is for another name: expected a "
                       "certificate that the system or the given CA file trusts");
+    if (!result && result.error() == httplib::Error::Connection)
+      throw Error(ErrorCode::kIo, "server " + url +
+                                      ": no connection: expected a server that accepts connections "
+                                      "at this address");
     if (!result)
       throw Error(ErrorCode::kIo, "server " + url + ": " + httplib::to_string(result.error()) +
                                       ": expected an answer");

@@ -19,8 +19,8 @@ std::string age_text(const std::string& moment, double now_s);
 // text, and emoji, need two columns.
 std::string cut_to_columns(const std::string& text, size_t columns);
 
-// Returns the lines of a table. `align` has a character for each cell of a row: 'l' for the left,
-// 'r' for the right. Each column is as wide as its widest cell. If a line would be longer than
+// Returns the lines of a table. `align` has a character for each cell of a row: 'l' aligns it left,
+// and 'r' right. Each column is as wide as its widest cell. If a line would be longer than
 // `columns`, its last cell is cut. If less than 20 columns would remain for the last cells, the
 // cells before them are also cut, to 8 columns or more. 0 columns: nothing is cut.
 std::vector<std::string> table_lines(const std::vector<std::vector<std::string>>& rows,

@@ -88,8 +88,7 @@ void check_export_options(const ExportFormat& format, const ExportOptions& optio
                                             : "the format " + formats) +
                                ", not " + format.name);
   }
-  if (options.band && options.grid != GridKind::kSdf)
-    throw FieldError("band", "also " + option_text("grid", "sdf"));
+  if (options.band && options.grid != GridKind::kSdf) throw FieldError("band", "also the grid sdf");
   if (options.band && (*options.band < 1 || *options.band > kMaxExportBand))
     throw FieldError("band", "a whole number from 1 to " + std::to_string(kMaxExportBand));
 }

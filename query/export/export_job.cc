@@ -120,8 +120,11 @@ std::string damage_text() {
 }
 
 void refuse_empty(const ExportJob& job) {
-  throw Error(ErrorCode::kInvalidInput, job.file.path() + ": no voxels are selected: expected a " +
-                                            option_text("region") + " with voxels");
+  throw Error(
+      ErrorCode::kInvalidInput,
+      job.file.path() + (job.file.empty() ? ": the file has no voxels: expected a file with voxels"
+                                          : ": no voxels are selected: expected a " +
+                                                option_text("region") + " with voxels"));
 }
 
 void require_written(const ExportJob& job, uint64_t written, uint64_t expected) {

@@ -57,9 +57,10 @@ struct ExportJob {
   }
 };
 
-// Reports a stage of the export's progress. The stage "export" first compares the input file with
-// its checksums: before it reads the file for the output, but after the checks of limits, because a
-// format that cannot store a huge file must refuse it without reading it. Every 4096th call of
+// Reports a stage of the export's progress. The stage "export", which every format has, first
+// compares the input file with its checksums. It comes after the checks of limits, because a format
+// that cannot store a huge file must refuse it without reading it. Some formats read the file
+// earlier, and then report other errors first. Every 4096th call of
 // advance() reports, and checks for cancellation. The destructor ends the stage.
 class ExportStage {
  public:

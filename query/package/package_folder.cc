@@ -65,6 +65,7 @@ void refuse_other_folder(FileSystem& files, const std::string& path) {
 // Error{kNotFound} if no package can be written to `path`.
 bool has_left_lock(FileSystem& files, const std::string& path) {
   refuse_other_folder(files, path);
+  for (const char* name : {"index.html", kIndexName}) refuse_link(path + "/" + name);
   const auto lock = open_if_there(files, OutputLock::path_of(path));
   return lock && lock->size() == 0;
 }

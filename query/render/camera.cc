@@ -47,9 +47,8 @@ Camera::Camera(const Placement& p, int width, int height)
                                               " degrees: expected more than 0 and less than 180");
   const double distance = length(p.target - p.eye);
   if (!(distance > 0))
-    throw Error(ErrorCode::kInvalidInput, "the camera and its target are both at " +
-                                              point_text(p.eye) +
-                                              ": expected two different points");
+    throw Error(ErrorCode::kInvalidInput,
+                "the camera and its target are the same point: expected two different points");
   if (!std::isfinite(distance))
     throw Error(ErrorCode::kInvalidInput, "the distance from the camera at " + point_text(p.eye) +
                                               " to its target at " + point_text(p.target) +

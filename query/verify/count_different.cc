@@ -10,6 +10,7 @@
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
+#include "core/base/process_limits.h"
 #include "core/dag/node_hash.h"
 #include "core/format/global/open_global.h"
 #include "core/format/verify/verify_checksums.h"
@@ -163,17 +164,20 @@ class LevelCounts {
 // Compares in memory. Returns nullopt if the memory is not sufficient.
 std::optional<DiffReport> count_in_memory(const voxdag_reader::File& a,
                                           const voxdag_reader::File& b,
-                                          const CountDifferentSpec& spec,
+                                          const CountDifferentSpec& spec, Progress& progress,
                                           const CancelToken& cancel) {
   const uint64_t file_bytes = a.file_bytes() + b.file_bytes();
   if (file_bytes >= spec.memory_bytes) return std::nullopt;
   MemoryBudget budget(std::min(spec.memory_bytes - file_bytes, spec.list_bytes));
+  std::optional<DiffReport> report;
+  progress.begin_stage("compare", 0, "pairs of nodes");
   try {
-    return diff_global_files(a, b, spec.threads, budget, cancel);
+    report = diff_global_files(a, b, spec.threads, budget, cancel);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kOutOfMemory) throw;
-    return std::nullopt;
   }
+  progress.end_stage();
+  return report;
 }
 
 }  // namespace
@@ -185,8 +189,9 @@ CountDifferentReport count_different(const voxdag_reader::File& a, const voxdag_
   for (const voxdag_reader::File* file : {&a, &b}) {
     PageLimit pages(*file, spec.memory_bytes);
     verify_checksums(*file, spec.threads, pages, progress, cancel);
+    if (resident_bytes() > spec.memory_bytes / 2) file->release_pages();
   }
-  if (const auto report = count_in_memory(a, b, spec, cancel)) return {*report, 0};
+  if (const auto report = count_in_memory(a, b, spec, progress, cancel)) return {*report, 0};
   return with_reader_errors([&] { return LevelCounts(a, b, spec, files, cancel).run(progress); });
 }
 

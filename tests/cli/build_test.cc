@@ -217,6 +217,9 @@ TEST_F(BuildCommand, ReadsOptionsFromAFile) {
       "attributes = color\nresolution = 32\n");
   expect_error(2, "array.toml:6: 'attributes' is given several times, first in line 2",
                {"build", "m.glb", "-o", "x.vdag", "--config", "array.toml"});
+  put("section.toml", "threads = 2\n[x]\nthreads = 3\n");
+  expect_error(2, "is not an option of build",
+               {"build", "m.glb", "-o", "y.vdag", "--config", "section.toml"});
   put("wrong.toml", "resolutoin = 32\n");
   expect_error(2, "resolutoin", {"build", "m.glb", "-o", "x.vdag", "--config", "wrong.toml"});
 }

@@ -49,5 +49,20 @@ TEST_F(LinkedOutput, IsRefused) {
   expect_refused("o.npy", {"render", "s.vdag", "--depth", "o.npy"});
 }
 
+TEST_F(LinkedOutput, IsRefusedInAPackage) {
+  ASSERT_EQ(run({"publish", "s.vdag", "-o", "p"}).status, 0);
+  for (const char* name : {"p/index.html", "p/package.json"}) {
+    const std::string path = folder_.file(name), kept = folder_.file("kept");
+    std::filesystem::rename(path, kept);
+    std::filesystem::create_symlink("../kept", path);
+    const Answer answer = run({"publish", "s.vdag", "-o", "p"});
+    EXPECT_EQ(answer.status, 2) << answer.err;
+    EXPECT_NE(answer.err.find(std::string(name) + " is a symbolic link"), std::string::npos)
+        << answer.err;
+    std::filesystem::remove(path);
+    std::filesystem::rename(kept, path);
+  }
+}
+
 }  // namespace
 }  // namespace command_line

@@ -3,6 +3,7 @@
 // used. Thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 
@@ -15,9 +16,11 @@ class PageLimit {
   static constexpr uint64_t kIntervalBytes = uint64_t{64} << 20;
 
   // `file` must outlive this object. `limit_bytes` is the limit of the process's resident memory.
-  // The process can exceed it by `interval_bytes` of pages.
-  PageLimit(const voxdag_reader::File& file, uint64_t limit_bytes,
-            uint64_t interval_bytes = kIntervalBytes)
+  // The process can exceed it by `interval_bytes` of pages; by default, by an eighth of the limit.
+  PageLimit(const voxdag_reader::File& file, uint64_t limit_bytes)
+      : PageLimit(file, limit_bytes,
+                  std::clamp(limit_bytes / 8, uint64_t{1}, uint64_t{kIntervalBytes})) {}
+  PageLimit(const voxdag_reader::File& file, uint64_t limit_bytes, uint64_t interval_bytes)
       : file_(file), limit_bytes_(limit_bytes), interval_bytes_(interval_bytes) {}
 
   // Call it after reading `bytes` bytes of the file.

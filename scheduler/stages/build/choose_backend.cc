@@ -57,14 +57,15 @@ void check_backend(const RunOptions& options, VoxelRule rule) {
       options.backend == BackendName::kParallelHost || options.backend == BackendName::kCuda;
   if (parallel && !traits_of(rule).is_parallel)
     refuse_backend("backend " + backend + ": it does not have the rule '" + traits_of(rule).name +
-                   "'; expected " + option_text("backend", "cpu") + " or auto");
+                   "'; expected " + option_text("backend", "cpu") + " or " +
+                   option_text("backend", "auto"));
   const bool is_given = options.method != MethodName::kDefault;
   if (is_given && parallel == (options.method == MethodName::kConsing))
-    refuse_backend("method '" + method + "': backend " + backend +
-                   (parallel ? " does not have it: expected " + option_text("method", "pointers") +
-                                   " or hashes"
-                             : " does not have it: expected " +
-                                   option_text("backend", "parallel-host") + " or cuda"));
+    refuse_backend(
+        "method '" + method + "': backend " + backend + " does not have it: expected " +
+        (parallel
+             ? option_text("method", "pointers") + " or " + option_text("method", "hashes")
+             : option_text("backend", "parallel-host") + " or " + option_text("backend", "cuda")));
   if (options.backend == BackendName::kCuda && !cuda_device_available())
     throw Error(ErrorCode::kDevice, "backend cuda: " + cuda_device_problem());
 }

@@ -1,8 +1,12 @@
 // Compares the voxels of small files, with lists in scratch files.
 #include "query/verify/count_different.h"
 
+#include <cstring>
+#include <tuple>
+
 #include "tests/support/error_of.h"
 #include "tests/support/faulty_files.h"
+#include "tests/unit/core/format/color/colored_files.h"
 #include "tests/unit/query/combine/combine_fixture.h"
 
 namespace voxdag::query {
@@ -87,6 +91,41 @@ TEST_F(CountDifferent, DamagedLevels) {
   }
 }
 
+// Wrong words with correct checksums are detected, or give other counts, in the same way with and
+// without scratch files.
+TEST_F(CountDifferent, HostileLevels) {
+  write_global(path("b"), random_voxels(8, 64));
+  write_global(path("a"), random_voxels(7, 64));
+  const std::string intact = bytes("a");
+  std::vector<size_t> places;
+  const auto file = open_global_file(path("a"));
+  for (uint32_t l = 0; l < file->brick_level(); ++l)
+    for (const size_t at : {size_t{0}, size_t{1}, file->level(l).word_count - 1})
+      places.push_back(file->level(l).file_offset + 4 * at);
+  int refused = 0;
+  for (const size_t at : places)
+    for (const uint32_t wrong : {0u, 1u, 0xfffffff0u, ~0u}) {
+      SCOPED_TRACE(testing::Message() << at << " " << wrong);
+      std::string damaged = intact;
+      std::memcpy(damaged.data() + at, &wrong, sizeof wrong);
+      put_checksums_right(damaged);
+      write_bytes(path("a"), damaged);
+      const auto outcome = [&](uint64_t list_bytes) {
+        try {
+          const DiffReport report = count(list_bytes).voxels;
+          return std::tuple(ErrorCode::kIo, report.only_a, report.only_b);
+        } catch (const Error& error) {
+          return std::tuple(error.code(), uint64_t{0}, uint64_t{0});
+        }
+      };
+      const auto small = outcome(256);
+      EXPECT_EQ(small, outcome(~uint64_t{0}));
+      refused += std::get<0>(small) == ErrorCode::kCorrupt;
+      expect_files({"a", "b"});
+    }
+  EXPECT_GT(refused, 10);
+}
+
 // If the disk is full from the n-th write on, the error is kNoSpace. Temporary files are removed.
 TEST_F(CountDifferent, FullDisk) {
   write_global(path("a"), random_voxels(7, 64));
@@ -110,8 +149,28 @@ TEST_F(CountDifferent, FullDisk) {
 TEST_F(CountDifferent, Canceled) {
   write_global(path("a"), random_voxels(7, 64));
   write_global(path("b"), random_voxels(8, 64));
-  never_.cancel();
-  EXPECT_EQ(error_of([&] { count(256); }).code(), ErrorCode::kCanceled);
+  class Canceling : public NoProgress {
+   public:
+    explicit Canceling(CancelToken& token) : token_(token) {}
+    void advance(uint64_t) override {
+      if (is_comparing_) token_.cancel();
+    }
+    void begin_stage(std::string_view stage, uint64_t total, std::string_view) override {
+      is_comparing_ = stage == "compare" && total > 0;
+    }
+
+   private:
+    CancelToken& token_;
+    bool is_comparing_ = false;
+  } progress(never_);
+  const auto a = open_global_file(path("a")), b = open_global_file(path("b"));
+  CountDifferentSpec spec;
+  spec.memory_bytes = uint64_t{64} << 20;
+  spec.work_prefix = path("a.work-");
+  spec.list_bytes = 256;
+  EXPECT_EQ(
+      error_of([&] { count_different(*a, *b, spec, system_files(), progress, never_); }).code(),
+      ErrorCode::kCanceled);
   expect_files({"a", "b"});
 }
 

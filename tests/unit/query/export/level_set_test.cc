@@ -237,7 +237,7 @@ TEST_F(LevelSetTest, ExportsReportTheirVoxelsAndProgress) {
       return error_of([&] { exported(format.name, options, none, memory_bytes); }).message();
     };
     EXPECT_EQ(message({.grid = GridKind::kMask, .band = 2}, 64 << 20),
-              "'band': expected also --grid sdf");
+              "'band': expected also the grid sdf");
     EXPECT_EQ(message({.grid = GridKind::kSdf, .band = 17}, 64 << 20),
               "'band': expected a whole number from 1 to 16");
     EXPECT_NE(
