@@ -37,17 +37,17 @@ SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
     return;
   }
   const auto known = store_.upload(name_);
-  if (known && known->total && total_ != known->total)
-    throw RequestError(RequestError::Kind::kInvalid,
-                       "Content-Range: the total of this part is " +
-                           (total_ ? std::to_string(*total_) : std::string("missing")) +
-                           ": expected " + std::to_string(*known->total) +
-                           ", the total of the first part");
   if (first_ != (known ? known->offset : 0)) throw wrong_offset(first_, known ? known->offset : 0);
   if (!has_part()) {
     store_.drop_upload(name_);
     throw wrong_offset(first_, 0);
   }
+  if (known->total && total_ != known->total)
+    throw RequestError(RequestError::Kind::kInvalid,
+                       "Content-Range: the total of this part is " +
+                           (total_ ? std::to_string(*total_) : std::string("missing")) +
+                           ": expected " + std::to_string(*known->total) +
+                           ", the total of the first part");
   file_ = store_.files_.open_write(path);
 }
 

@@ -68,7 +68,8 @@ struct Route {
   std::optional<Content> body = {};
   bool is_body_required = true;
   std::vector<Answer> answers = {};
-  // Statuses of the route's problems, in addition to kCommonProblems.
+  // Statuses of the route's problems, in addition to kCommonProblems. Router::add() adds 507 to
+  // routes that change something.
   std::vector<int> problems = {};
 };
 

@@ -70,6 +70,8 @@ void Router::add(Route route, Handler handler) {
 }
 
 void Router::add(Route route, PlainHandler handler) {
+  // Requests that change something write to the disk, which can be full.
+  if (route.method != "GET") route.problems.push_back(507);
   auto segments = parse_target(route.pattern).segments;
   entries_.push_back({std::move(route), std::move(segments), std::move(handler)});
 }
