@@ -73,7 +73,7 @@ int open_to_change(const char* call, const std::string& path, Contents contents)
   return opened.take();
 }
 
-[[noreturn]] void refuse_link(const std::string& path) {
+[[noreturn]] void refuse_own_link(const std::string& path) {
   throw Error(ErrorCode::kInvalidInput,
               path + " is a symbolic link: expected a regular file that voxdag wrote");
 }
@@ -91,7 +91,7 @@ class PosixReadableFile : public ReadableFile {
   // `more_flags` is O_NOFOLLOW or 0.
   explicit PosixReadableFile(const std::string& path, int more_flags = 0)
       : path_(path), fd_(open_retrying(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | more_flags)) {
-    if (fd_.get() < 0 && errno == ELOOP && more_flags == O_NOFOLLOW) refuse_link(path);
+    if (fd_.get() < 0 && errno == ELOOP && more_flags == O_NOFOLLOW) refuse_own_link(path);
     if (fd_.get() < 0) fail("open", path, errno);
     struct stat s {};
     if (fstat(fd_.get(), &s) != 0) fail("check the type of", path, errno);

@@ -45,16 +45,10 @@ class CombineErrors : public Combine {
 TEST_F(CombineErrors, DamagedInputs) {
   for (const char* name : {"a", "b"}) {
     const std::string intact = bytes(name);
-    const auto file = open_global_file(path(name));
-    for (uint32_t l = 0; l <= file->brick_level(); ++l) {
-      SCOPED_TRACE(l);
-      std::string damaged = intact;
-      const size_t at = file->level(l).file_offset + 4 * (file->level(l).word_count / 2);
-      damaged[at] = static_cast<char>(damaged[at] ^ 4);
-      write_bytes(path(name), damaged);
+    damage_each_level(name, [&] {
       EXPECT_EQ(combine_error(system_files(), never_), ErrorCode::kCorrupt);
       expect_files({"a", "b"});
-    }
+    });
     write_bytes(path(name), intact.substr(0, intact.size() - 8));
     EXPECT_EQ(combine_error(system_files(), never_), ErrorCode::kCorrupt);
     write_bytes(path(name), intact);

@@ -62,6 +62,22 @@ class Combine : public testing::Test {
     return bytes(output);
   }
 
+  // For each level of a file: changes a byte in the middle of the level, and calls check(). At the
+  // end, the file is intact again.
+  template <class Check>
+  void damage_each_level(const std::string& name, const Check& check) const {
+    const std::string intact = bytes(name);
+    const auto file = open_global_file(path(name));
+    for (uint32_t l = 0; l <= file->brick_level(); ++l) {
+      SCOPED_TRACE(l);
+      std::string damaged = intact;
+      const size_t at = file->level(l).file_offset + 4 * (file->level(l).word_count / 2);
+      damaged[at] = static_cast<char>(damaged[at] ^ 4);
+      write_bytes(path(name), damaged);
+      check();
+    }
+    write_bytes(path(name), intact);
+  }
   // Checks that the folder contains exactly these files.
   void expect_files(std::vector<std::string> names) const {
     std::vector<std::string> found;

@@ -75,20 +75,11 @@ TEST_F(CountDifferent, FilesOfDifferentGridsAreRefused) {
 TEST_F(CountDifferent, DamagedLevels) {
   write_global(path("a"), random_voxels(7, 64));
   write_global(path("b"), random_voxels(8, 64));
-  for (const char* name : {"a", "b"}) {
-    const std::string intact = bytes(name);
-    const auto file = open_global_file(path(name));
-    for (uint32_t l = 0; l <= file->brick_level(); ++l) {
-      SCOPED_TRACE(l);
-      std::string damaged = intact;
-      const size_t at = file->level(l).file_offset + 4 * (file->level(l).word_count / 2);
-      damaged[at] = static_cast<char>(damaged[at] ^ 4);
-      write_bytes(path(name), damaged);
+  for (const char* name : {"a", "b"})
+    damage_each_level(name, [&] {
       EXPECT_EQ(error_of([&] { count(256); }).code(), ErrorCode::kCorrupt);
       expect_files({"a", "b"});
-    }
-    write_bytes(path(name), intact);
-  }
+    });
 }
 
 // Wrong words with correct checksums are detected, or give other counts, in the same way with and
