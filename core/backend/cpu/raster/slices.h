@@ -29,6 +29,7 @@ struct BlockComponents {
   bool is_alike[8];     // all corners of the entry have the same class
   Slices voxels[8];
   Slices rest;  // empty voxels of components without a corner
+  int empty;    // number of the block's empty voxels
 };
 
 }  // namespace voxdag::cpu

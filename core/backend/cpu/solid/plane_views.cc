@@ -80,10 +80,12 @@ std::optional<PlaneViews::Sides> PlaneViews::read_part(const TileViews& views, c
       int64_t value = base + x * step[0] + y * step[1];
       for (int z = 0; z <= edge; ++z, value += step[2]) {
         const bool is_above = value >= 0;
-        const int32_t sum = TileViews::class_of(views.at(low[0] + x, low[1] + y, low[2] + z));
+        const int32_t sum = views.at(low[0] + x, low[1] + y, low[2] + z);
         if (!has[is_above]) sums[is_above] = sum;
         has[is_above] = true;
-        if (sums[is_above] != sum) return {};
+        if (sums[is_above] != sum &&
+            TileViews::class_of(sums[is_above]) != TileViews::class_of(sum))
+          return {};
       }
     }
   return sides_of(has, sums);

@@ -188,14 +188,12 @@ void TileFiller::insert_units(uint64_t key, const VoxelBlock& block) {
   const int count = components_.count;
   if (count == 0 || count > 2 || components_.rest.any()) return;
   UnitsMemo::Units units{};
-  int voxels = kBlockBricks * 64;
-  for (const uint64_t brick : block.bricks) voxels -= popcount64(brick);
   if (count == 2) {
     units.voxels[0] =
         static_cast<uint16_t>(kernels_.add_slices(components_.voxels[0], units.first));
     units.corners[0] = static_cast<uint8_t>(components_.corners[0]);
   }
-  units.voxels[1] = static_cast<uint16_t>(voxels - units.voxels[0]);
+  units.voxels[1] = static_cast<uint16_t>(components_.empty - units.voxels[0]);
   units.corners[1] = static_cast<uint8_t>(components_.corners[count - 1]);
   memo_.insert(key, block, units);
 }
