@@ -16,7 +16,9 @@ struct AttributeOptions {
   bool no_attributes = false;
 
   void declare(Command& command);
-  void apply(query::CombineSpec& spec) const {
+  // Sets these options in a query::CombineSpec or an EditSpec.
+  template <class Spec>
+  void apply(Spec& spec) const {
     spec.fill_color = fill_color;
     spec.color_resolution = color_resolution;
     spec.attributes = !no_attributes;

@@ -1,11 +1,5 @@
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
 
 #include <algorithm>
 
@@ -13,7 +7,7 @@
 #include "python/native/bindings.h"
 #include "python/native/long_work.h"
 #include "python/native/path_text.h"
-#include "scene/mesh_files.h"
+#include "python/native/scene_parts.h"
 #include "scheduler/plan_build.h"
 #include "scheduler/replaced_result.h"
 #include "scheduler/run_build.h"
@@ -21,48 +15,6 @@
 
 namespace voxdag::python {
 namespace {
-
-// The vertices of a mesh, one per row, as float32 or float64. mesh_of() throws for any other type.
-using Vertices = nb::ndarray<nb::ro, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-template <class Number, ssize_t Columns>
-using Matrix = nb::ndarray<const Number, nb::shape<-1, Columns>, nb::c_contig, nb::device::cpu>;
-
-// A scene file in memory: a path, which is its name in messages, and its bytes.
-using FileBytes = std::pair<std::string, nb::bytes>;
-
-// A mesh of a scene: a path, which is its name in messages; vertices; triangles; the colors of the
-// vertices; and a texture: the name of its material, the bytes of an image file, and the texture
-// coordinates of the vertices.
-using MeshArrays =
-    std::tuple<std::string, Vertices, Matrix<uint32_t, 3>, std::optional<Matrix<uint8_t, 4>>,
-               std::string, nb::bytes, std::optional<Matrix<float, 2>>>;
-
-template <class Number>
-std::span<const Number> numbers_of(const auto& rows) {
-  return {static_cast<const Number*>(rows.data()), rows.size()};
-}
-
-std::span<const std::byte> bytes_of(const nb::bytes& bytes) {
-  return {static_cast<const std::byte*>(bytes.data()), bytes.size()};
-}
-
-Mesh mesh_of(const MeshArrays& arrays) {
-  const auto& [path, vertices, triangles, colors, name, texture, coordinates] = arrays;
-  Mesh mesh;
-  if (vertices.dtype() == nb::dtype<float>())
-    mesh.positions = numbers_of<float>(vertices);
-  else if (vertices.dtype() == nb::dtype<double>())
-    mesh.positions = numbers_of<double>(vertices);
-  else
-    throw nb::type_error("vertices: expected float32 or float64");
-  mesh.indices = numbers_of<uint32_t>(triangles);
-  if (colors) mesh.colors = numbers_of<uint8_t>(*colors);
-  if (!coordinates) return mesh;
-  mesh.texture_name = name;
-  mesh.texture = bytes_of(texture);
-  mesh.texture_coordinates = numbers_of<float>(*coordinates);
-  return mesh;
-}
 
 // Sets the members of a BuildSpec from a dict of keyword arguments, and removes these arguments
 // from the dict. An argument that is None counts as absent. Throws Error{kInvalidInput} for a wrong
@@ -132,30 +84,14 @@ BuildSpec spec_of(uint64_t resolution, nb::dict options) {
   return spec;
 }
 
-// The parts of one scene. `bytes` are files in memory.
-struct SceneParts {
-  std::vector<PathText> files;
-  std::vector<FileBytes> bytes;
-  std::vector<MeshArrays> meshes;
-};
-
 // Adds the paths of all parts of `scene` to `spec`, runs work(spec, context) with run_long_work(),
 // and returns its result. `context` has a file system in which these paths name the files and
 // meshes in memory.
 template <class Work>
-std::string run_with_scene(BuildSpec spec, SceneParts scene, nb::object progress,
+std::string run_with_scene(BuildSpec spec, const SceneParts& scene, nb::object progress,
                            const Work& work) {
-  std::vector<std::string>& scenes = spec.geometry.scenes;
   MeshFiles file_system(system_files());
-  for (PathText& file : scene.files) scenes.push_back(std::move(file.bytes));
-  for (const auto& [path, bytes] : scene.bytes) {
-    scenes.push_back(path);
-    file_system.add_file(path, bytes_of(bytes));
-  }
-  for (const MeshArrays& mesh : scene.meshes) {
-    scenes.push_back(std::get<0>(mesh));
-    file_system.add(scenes.back(), mesh_of(mesh));
-  }
+  add_parts(scene, file_system, spec.geometry.scenes);
   return run_long_work(std::move(progress), [&](Progress& relay, const CancelToken& cancel) {
     return work(spec, BuildContext{file_system, relay, cancel});
   });

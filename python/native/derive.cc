@@ -13,6 +13,7 @@
 #include "core/format/global/open_global.h"
 #include "core/io/file_system.h"
 #include "python/native/bindings.h"
+#include "python/native/color_argument.h"
 #include "python/native/long_work.h"
 #include "python/native/memory.h"
 #include "python/native/path_text.h"
@@ -113,8 +114,7 @@ void combine(const PathText& a, const PathText& b, const std::string& operation,
   spec.output = output.bytes;
   spec.offset = offset;
   spec.clip = clip;
-  if (fill_color)
-    spec.fill_color = voxdag_reader::Rgb{fill_color->at(0), fill_color->at(1), fill_color->at(2)};
+  spec.fill_color = rgb_of(fill_color);
   spec.color_resolution = color_resolution;
   spec.attributes = !no_attributes;
   spec.replace = replace;

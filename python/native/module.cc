@@ -35,5 +35,6 @@ NB_MODULE(_native, module) {
   voxdag::python::bind_build(module);
   voxdag::python::bind_dag(module);
   voxdag::python::bind_derive(module);
+  voxdag::python::bind_edit(module);
   voxdag::python::bind_render(module);
 }

@@ -51,6 +51,9 @@ def test_types(tmp_path):
         voxdag.build(([[0, 0, 0]], [[0, 0, 0]]), resolution=64, output="scene.vdag")
         reveal_type((dag | dag) - dag)
         voxdag.combine(dag, "b.vdag", "or")
+        reveal_type(dag.edit(cut=["box:0,0,0,1,1,1"], add=mesh, paste=[("b.vdag", (0, 0, 0))]))
+        dag.edit(paste=["b.vdag"])
+        voxdag.edit("a.vdag", fill=(0, 0, 0))
     """)
     )
     checked = mypy(tmp_path, "--strict", "--allow-any-generics", "-p", "voxdag")
@@ -75,6 +78,9 @@ def test_types(tmp_path):
         "user.py:21: error: Argument 1",
         'user.py:25: note: Revealed type is "voxdag._dag.Dag"',
         "user.py:26: error: Argument 3",
-        "Found 9 errors",
+        'user.py:27: note: Revealed type is "voxdag._dag.Dag"',
+        "user.py:28: error: List item 0",
+        'user.py:29: error: Unexpected keyword argument "fill"',
+        "Found 11 errors",
     ):
         assert expected in user, (expected, user)

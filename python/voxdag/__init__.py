@@ -7,13 +7,13 @@
         dag.dense(region, level=8)              # a region of the grid with 2^8 cells per edge
 
 Long calls release the interpreter's lock, so other Python threads can run. build(), plan(),
-combine(), extract(), reorder(), export() and render() stop on Ctrl-C. If a function fails, it
-raises `voxdag.Error`, whose attribute `code` names the kind of the error.
+combine(), edit(), extract(), reorder(), export() and render() stop on Ctrl-C. If a function fails,
+it raises `voxdag.Error`, whose attribute `code` names the kind of the error.
 """
 
 from ._build import Scene, build, plan
 from ._dag import Dag, Hits, open
-from ._derive import combine, export, export_formats, extract, reorder
+from ._derive import combine, edit, export, export_formats, extract, reorder
 from ._error import Error
 from ._mesh import Mesh
 from ._notebook import Viewer
@@ -40,6 +40,7 @@ __all__ = [
     "Viewer",
     "build",
     "combine",
+    "edit",
     "export",
     "export_formats",
     "extract",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import operator
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import IO, TYPE_CHECKING, Any, Callable, SupportsIndex, Union
 
 from numpy.typing import ArrayLike
@@ -16,7 +17,7 @@ from ._adapt import SceneObject, is_mesh, meshes_of
 from ._error import Error, Path, path_text
 from ._help import lists_options
 from ._laz import decompressed
-from ._mesh import Mesh, native_meshes
+from ._mesh import Mesh, NativeMesh, native_meshes
 from ._options import PATHS, BuildOptions
 from ._progress import Progress, shown
 
@@ -123,12 +124,34 @@ def _call(
     for name in PATHS:
         if given.get(name) is not None:
             given[name] = path_text(given[name])
-    files, streams, meshes = _parts_of(scene)
     with_colors = any(given.get(name) for name in ("color", "attributes", "cutouts"))
+    prepared = native_scene(scene, with_colors, las_prefix, bool(given.get("skip_invalid")))
+    with prepared as parts, shown(progress) as callback:
+        return json.loads(function(*parts, edge, callback, given))
+
+
+# The parts of a scene in the form that the native module requires: paths, files in memory, meshes.
+_NativeScene = tuple[list[str], list[tuple[str, bytes]], list[NativeMesh]]
+
+
+def native_scene(
+    scene: Scene, with_colors: bool, las_prefix: str, skip_invalid: bool = False
+) -> contextlib.AbstractContextManager[_NativeScene]:
+    """Returns a context manager that provides the parts of a scene for the native module. Meshes
+    have no colors unless `with_colors` is True. LAS files whose paths begin with `las_prefix`
+    replace LAZ files until the end of the context."""
+    files, streams, meshes = _parts_of(scene)
     contents = [(f"file in memory {i}", _bytes_of(stream)) for i, stream in enumerate(streams)]
-    arrays = native_meshes(meshes, with_colors, bool(given.get("skip_invalid")))
-    with shown(progress) as callback, decompressed(files, las_prefix) as readable:
-        return json.loads(function(readable, contents, arrays, edge, callback, given))
+    arrays = native_meshes(meshes, with_colors, skip_invalid)
+    return _with_las(files, las_prefix, contents, arrays)
+
+
+@contextlib.contextmanager
+def _with_las(
+    files: list[str], las_prefix: str, contents: list[tuple[str, bytes]], meshes: list[NativeMesh]
+) -> Iterator[_NativeScene]:
+    with decompressed(files, las_prefix) as readable:
+        yield readable, contents, meshes
 
 
 def _edge_of(resolution: SupportsIndex | None, options: BuildOptions) -> int:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ._derive import Operation
     from ._notebook import Viewer
     from ._types import (
+        EditOptions,
         ExportOptions,
         ExportReport,
         ExtractOptions,
@@ -381,6 +382,14 @@ class Dag(DagFile):
         from ._derive import export
 
         return export(self, output, **options)
+
+    def edit(self, output: Path | None = None, **options: Unpack[EditOptions]) -> Dag:
+        """Writes a changed copy of this file, and returns its Dag: removes spheres and boxes, adds
+        scenes, and pastes other files. Takes the options of voxdag.edit(). Without `output`, the
+        copy is a temporary file."""
+        from ._derive import edit
+
+        return edit(self, output, **options)
 
     def reorder(self, output: Path, **options: Unpack[ReorderOptions]) -> ReorderReport:
         """Writes a copy of this file with its nodes in another order. Takes the options of

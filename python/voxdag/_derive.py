@@ -1,15 +1,17 @@
-"""Writes new files from .vdag files: extracts, results of set operations, copies in another node
-order, and exports to the formats of other programs."""
+"""Writes new files from .vdag files: extracts, results of set operations, edited copies, copies in
+another node order, and exports to the formats of other programs."""
 
+import contextlib
 import json
 import operator
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
-from typing import Literal, Optional, Union, cast
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal, Optional, Union, cast
 
 from . import _native
+from ._build import Scene, native_scene
 from ._dag import Dag
 from ._error import Error, Path, memory_text, path_text, thread_count
 from ._progress import Progress, shown
@@ -193,20 +195,91 @@ def combine(
     output exists, or if the operation fails.
     """
     paths = path_text(a), path_text(b)
-    moved = None if offset is None else _voxel_of(offset)
+    moved = None if offset is None else _voxel_of(offset, "offset")
     fill = None if fill_color is None else _color_of(fill_color)
-    cells = operator.index(color_resolution)
-    if not 0 <= cells <= 1 << 20:
-        raise Error(f"color_resolution={cells}: expected at most 2^20", "invalid_input")
-    folder = tempfile.mkdtemp(prefix="voxdag-") if output is None else None
-    path = f"{folder}/combined.vdag" if output is None else path_text(output)
-    try:
-        with shown(progress) as callback:
-            _native.combine(
-                *paths,
-                operation,
+    cells = _cells_of(color_resolution)
+    with _new_file(output, "combined.vdag") as new, shown(progress) as callback:
+        _native.combine(
+            *paths,
+            operation,
+            new.path,
+            moved,
+            clip,
+            fill,
+            cells,
+            bool(no_attributes),
+            memory_text(memory),
+            thread_count(threads),
+            force,
+            callback,
+        )
+    return new.open()
+
+
+def edit(
+    path: Path,
+    output: Optional[Path] = None,
+    *,
+    cut: Union[str, Sequence[str]] = (),
+    add: Optional[Scene] = None,
+    paste: Sequence[tuple[Path, tuple[int, int, int]]] = (),
+    clip: bool = False,
+    fill_color: Optional[tuple[int, int, int]] = None,
+    color_resolution: int = 0,
+    no_attributes: bool = False,
+    memory: Union[int, str, None] = None,
+    threads: int = 0,
+    force: bool = False,
+    progress: Progress = None,
+) -> Dag:
+    """Writes a changed copy of a .vdag file, and returns its Dag. The file's nodes must have the
+    order "hash". The edits are applied in this order: cut, add, paste.
+
+    path, output      the .vdag file to read, and the .vdag file to write. By default, the output is
+                      a temporary file, which is removed when the Dag is closed or no longer used.
+    cut               a shape, or a list of shapes. All voxels whose centers are in a shape are
+                      removed. A shape is a string: "sphere:X,Y,Z,R" with multiples of 0.5, or
+                      "box:X0,Y0,Z0,X1,Y1,Z1" with whole numbers, both in voxels of the grid. The
+                      center of voxel 0, 0, 0 is 0.5, 0.5, 0.5. A box does not contain the voxels of
+                      its high corner.
+    add               a scene to add, in one of the forms that build() takes. It is built with the
+                      grid and the attributes of the file. Triangles outside the grid are left out.
+    paste             a list of pairs (file, (x, y, z)). The voxels of the file, a path or a Dag,
+                      are added, so that its voxel 0, 0, 0 comes to the voxel x, y, z. The voxels of
+                      both files must have the same size.
+    clip              if True, drops voxels that `paste` puts outside the grid. By default, such
+                      voxels are an error.
+    fill_color        if only one of the files has colors: the color of the cells in which this file
+                      has no voxel, as three integers from 0 to 255 (sRGB)
+    color_resolution  maximum number of color cells per edge of the grid, a power of two; 0 means as
+                      many as the finest color cells of the files need
+    no_attributes     if True, the result has no colors and other attributes
+    memory            memory limit, as a number of bytes or as text such as "8GiB". The default is
+                      half of the machine's memory.
+    threads           number of threads; 0 means all cores
+    force             if True, replaces an existing output
+    progress          as in build()
+
+    Raises Error if no edit is given, if an argument is invalid, if a file cannot be pasted, if the
+    output exists, or if the edit fails.
+    """
+    path = path_text(path)
+    shapes = [cut] if isinstance(cut, str) else [str(shape) for shape in cut]
+    parts = [(path_text(part), _voxel_of(offset, "paste")) for part, offset in _pairs_of(paste)]
+    fill = None if fill_color is None else _color_of(fill_color)
+    cells = _cells_of(color_resolution)
+    with Dag(path) as dag:
+        with_colors = bool(dag.attributes) and not no_attributes
+    with _new_file(output, "edited.vdag") as new:
+        las_prefix = f"{new.path}.laz-"
+        scene = native_scene(() if add is None else add, with_colors, las_prefix)
+        with scene as scene_parts, shown(progress) as callback:
+            _native.edit(
                 path,
-                moved,
+                new.path,
+                shapes,
+                *scene_parts,
+                parts,
                 clip,
                 fill,
                 cells,
@@ -216,11 +289,7 @@ def combine(
                 force,
                 callback,
             )
-        return Dag(path) if folder is None else Dag._temporary(path, folder)
-    except BaseException:
-        if folder is not None:
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
+    return new.open()
 
 
 def reorder(
@@ -285,11 +354,55 @@ def _check_output(path: str, outputs: Sequence[str], force: bool) -> None:
             raise Error(f"{output} exists: expected another file, or force=True", "invalid_input")
 
 
-def _voxel_of(offset: tuple[int, int, int]) -> tuple[int, int, int]:
+class _NewFile:
+    """The .vdag file that a function writes. Without an output, it is a temporary file."""
+
+    def __init__(self, output: Optional[Path], name: str) -> None:
+        self._folder = tempfile.mkdtemp(prefix="voxdag-") if output is None else None
+        self.path = f"{self._folder}/{name}" if output is None else path_text(output)
+
+    def open(self) -> Dag:
+        return Dag(self.path) if self._folder is None else Dag._temporary(self.path, self._folder)
+
+    def remove(self) -> None:
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _new_file(output: Optional[Path], name: str) -> Iterator[_NewFile]:
+    """Provides a _NewFile, whose temporary folder is removed if the context raises an exception."""
+    new = _NewFile(output, name)
+    try:
+        yield new
+    except BaseException:
+        new.remove()
+        raise
+
+
+def _pairs_of(paste: Sequence[tuple[Path, tuple[int, int, int]]]) -> list[tuple[Any, Any]]:
+    try:
+        return [(part, offset) for part, offset in paste]
+    except (TypeError, ValueError):
+        raise Error(
+            f"paste={paste!r}: expected a list of pairs (file, (x, y, z))", "invalid_input"
+        ) from None
+
+
+def _cells_of(color_resolution: int) -> int:
+    cells = operator.index(color_resolution)
+    if not 0 <= cells <= 1 << 20:
+        raise Error(f"color_resolution={cells}: expected at most 2^20", "invalid_input")
+    return cells
+
+
+def _voxel_of(offset: tuple[int, int, int], name: str) -> tuple[int, int, int]:
     try:
         x, y, z = (int(number.__index__()) for number in offset)
     except (AttributeError, TypeError, ValueError):
-        raise Error(f"offset={offset!r}: expected three integers", "invalid_input") from None
+        raise Error(f"{name}={offset!r}: expected three integers", "invalid_input") from None
+    if any(abs(number) >= 1 << 63 for number in (x, y, z)):
+        raise Error(f"{name}={offset!r}: expected integers of 64 bits", "invalid_input")
     return x, y, z
 
 

@@ -13,6 +13,9 @@ from ._progress import Progress
 if TYPE_CHECKING:
     from typing_extensions import NotRequired
 
+    from ._build import Scene
+    from ._error import Path
+
 # A box of cells: a sequence or an array of six numbers. The first three are x, y, z of the low
 # corner, which is in the region. The last three are x, y, z of the high corner, which is not.
 Region = Union[Sequence[Any], NDArray[Any]]
@@ -173,6 +176,22 @@ class ExportOptions(TypedDict, total=False):
     compact: bool
     outside: bool
     watertight: bool
+    force: bool
+    progress: Progress
+
+
+class EditOptions(TypedDict, total=False):
+    """Options of edit()."""
+
+    cut: str | Sequence[str]
+    add: Scene | None
+    paste: Sequence[tuple[Path, tuple[int, int, int]]]
+    clip: bool
+    fill_color: tuple[int, int, int] | None
+    color_resolution: int
+    no_attributes: bool
+    memory: int | str | None
+    threads: int
     force: bool
     progress: Progress
 

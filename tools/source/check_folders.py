@@ -44,8 +44,9 @@ PRODUCT_INCLUDES = CORE_INCLUDES | {
     "query": CORE + ["scene", "merge"],
     "client": ["core/base", "core/fields", "core/io", "core/format"],  # core/format: SHA-256
     "server": CORE + ["scene", "scheduler", "query", "client"],
-    "cli": CORE + ["scene", "scheduler", "query", "client", "server"],
-    "python": CORE + ["scene", "scheduler", "query"],
+    "edit": CORE + ["scene", "scheduler", "query"],
+    "cli": CORE + ["scene", "scheduler", "query", "edit", "client", "server"],
+    "python": CORE + ["scene", "scheduler", "query", "edit"],
 }
 # Tests mirror the folders and include the code under test; the product never includes tests.
 ANYTHING = list(PRODUCT_INCLUDES)

@@ -28,6 +28,7 @@ BOXES = {
     "server": (2.5, 1, "HTTP service"),
     "library": (3.6, 1, "voxdag/build.h"),
     "scheduler": (2.9, 2, "the build"),
+    "edit": (4.4, 2, "voxdag edit"),
     "core/db": (0.9, 3, "SQLite"),
     "core/backend": (1.85, 3, "cpu, parallel, cuda"),
     "merge": (2.8, 3, "sub-DAGs to one DAG"),
