@@ -10,6 +10,7 @@
 #include "core/io/outputs/temporary_work.h"
 #include "core/io/overwrite.h"
 #include "query/dag/locked_outputs.h"
+#include "query/morphology/morphology.h"
 #include "scene/formats/formats.h"
 #include "scheduler/run_build.h"
 
@@ -70,13 +71,20 @@ class Edit {
     check_parts();
     const bool has_scenes = !edit_.scenes.empty();
     if (has_scenes) build_scenes();
-    steps_left_ = shapes_.size() + (has_scenes ? 1 : 0) + edit_.parts.size();
+    const bool has_morphology = edit_.dilate + edit_.erode > 0;
+    steps_left_ = shapes_.size() + (has_scenes ? 1 : 0) + edit_.parts.size() + has_morphology;
     for (const query::Shape& shape : shapes_)
       apply([&](const voxdag_reader::File& file) {
         return query::cut(file, shape, spec_, files_, progress_, cancel_);
       });
     if (has_scenes) unite(scenes_path(), std::nullopt);
     for (const PastedFile& part : edit_.parts) unite(part.path, part.offset);
+    if (has_morphology)
+      apply([&](const voxdag_reader::File& file) {
+        const query::Morphology morphology{edit_.erode > 0, edit_.dilate + edit_.erode,
+                                           edit_.outside_set};
+        return query::change_by_cube(file, morphology, spec_, files_, progress_, cancel_);
+      });
     files_.rename(current_, edit_.output);
     files_.sync_directory(parent_directory(edit_.output));
     return total_;
@@ -171,10 +179,21 @@ class Edit {
 
 query::CombineReport edit(const EditSpec& spec, FileSystem& files, Progress& progress,
                           const CancelToken& cancel) {
-  if (spec.cuts.empty() && spec.scenes.empty() && spec.parts.empty())
+  if (spec.cuts.empty() && spec.scenes.empty() && spec.parts.empty() && spec.dilate == 0 &&
+      spec.erode == 0)
     throw Error(ErrorCode::kInvalidInput, "no edit was given: expected " + option_text("cut") +
-                                              ", " + option_text("add") + " or " +
-                                              option_text("paste"));
+                                              ", " + option_text("add") + ", " +
+                                              option_text("paste") + ", " + option_text("dilate") +
+                                              " or " + option_text("erode"));
+  if (spec.dilate > 0 && spec.erode > 0)
+    throw Error(ErrorCode::kInvalidInput,
+                option_text("dilate") + " and " + option_text("erode") +
+                    " were both given: expected one of them, and the other in an edit of the "
+                    "result");
+  if (spec.outside_set && spec.erode == 0)
+    throw Error(ErrorCode::kInvalidInput, option_text("outside_set") +
+                                              " was given without an erosion: expected " +
+                                              option_text("erode"));
   query::LockedOutputs outputs(files,
                                {{spec.output}, inputs_of(spec, files, cancel), spec.replace});
   return Edit(spec, outputs.files(), progress, cancel).run();

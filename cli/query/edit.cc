@@ -11,15 +11,20 @@
 #include "cli/run_times.h"
 #include "cli/selection_options.h"
 #include "cli/terminal/progress_bar.h"
+#include "core/geometry/cube.h"
 
 namespace voxdag::cli {
 namespace {
+
+// Maximum of --dilate and --erode: the edge of the largest grid.
+constexpr int kMaxDistance = 1 << kMaxGridLevels;
 
 struct EditCommand {
   std::string input, output, memory;
   std::vector<std::string> cuts, scenes, parts;
   AttributeOptions attributes;
-  bool clip = false, force = false, quiet = false, json = false;
+  uint64_t dilate = 0, erode = 0;
+  bool clip = false, outside_set = false, force = false, quiet = false, json = false;
   unsigned threads = default_threads();
 };
 
@@ -42,6 +47,9 @@ void run(const EditCommand& command, CommandContext& context) {
   spec.cuts = command.cuts;
   spec.scenes = command.scenes;
   for (const std::string& part : command.parts) spec.parts.push_back(pasted_file(part));
+  spec.dilate = command.dilate;
+  spec.erode = command.erode;
+  spec.outside_set = command.outside_set;
   spec.input = command.input;
   spec.output = command.output;
   spec.clip = command.clip;
@@ -73,6 +81,18 @@ void declare(Command& command, EditCommand& state) {
               "add the file in PART.vdag@X,Y,Z, whose voxel 0,0,0 comes to voxel X,Y,Z; may be "
               "repeated")
       .one_value_each();
+  const Option dilate =
+      command
+          .option("--dilate", state.dilate,
+                  "then set all voxels of the grid within N voxels of a set voxel on each axis")
+          .range(1, kMaxDistance);
+  command
+      .option("--erode", state.erode,
+              "then keep only the voxels that have no unset voxel within N voxels on each axis")
+      .range(1, kMaxDistance)
+      .excludes(dilate);
+  command.flag("--outside-set", state.outside_set,
+               "for --erode, voxels outside of the grid count as set; otherwise as not set");
   command.flag("--clip", state.clip,
                "drop voxels that --paste puts outside of the grid; otherwise they are an error");
   state.attributes.declare(command);
@@ -87,7 +107,8 @@ void declare(Command& command, EditCommand& state) {
 }  // namespace
 
 void add_edit_command(CommandLine& line) {
-  add_command<EditCommand>(line, "edit", "cut shapes from a DAG, add scenes and paste DAGs");
+  add_command<EditCommand>(line, "edit",
+                           "cut shapes from a DAG, add scenes, paste DAGs, dilate, erode");
 }
 
 }  // namespace voxdag::cli

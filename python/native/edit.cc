@@ -19,13 +19,17 @@ using PartArguments = std::pair<PathText, std::array<int64_t, 3>>;
 
 void edit_file(const PathText& path, const PathText& output, std::vector<std::string> cuts,
                std::vector<PathText> files, std::vector<FileBytes> bytes,
-               std::vector<MeshArrays> meshes, const std::vector<PartArguments>& parts, bool clip,
+               std::vector<MeshArrays> meshes, const std::vector<PartArguments>& parts,
+               uint64_t dilate, uint64_t erode, bool outside_set, bool clip,
                const std::optional<std::array<uint8_t, 3>>& fill_color, uint64_t color_resolution,
                bool no_attributes, const std::string& memory, unsigned threads, bool replace,
                nb::object progress) {
   EditSpec spec;
   spec.cuts = std::move(cuts);
   for (const auto& [part, offset] : parts) spec.parts.push_back({part.bytes, offset});
+  spec.dilate = dilate;
+  spec.erode = erode;
+  spec.outside_set = outside_set;
   spec.input = path.bytes;
   spec.output = output.bytes;
   spec.clip = clip;
@@ -48,9 +52,9 @@ void edit_file(const PathText& path, const PathText& output, std::vector<std::st
 void bind_edit(nb::module_& module) {
   module.def("edit", &edit_file, nb::arg("path"), nb::arg("output"), nb::arg("cuts"),
              nb::arg("files"), nb::arg("bytes"), nb::arg("meshes"), nb::arg("parts"),
-             nb::arg("clip"), nb::arg("fill_color").none(), nb::arg("color_resolution"),
-             nb::arg("no_attributes"), nb::arg("memory"), nb::arg("threads"), nb::arg("replace"),
-             nb::arg("progress").none());
+             nb::arg("dilate"), nb::arg("erode"), nb::arg("outside_set"), nb::arg("clip"),
+             nb::arg("fill_color").none(), nb::arg("color_resolution"), nb::arg("no_attributes"),
+             nb::arg("memory"), nb::arg("threads"), nb::arg("replace"), nb::arg("progress").none());
 }
 
 }  // namespace voxdag::python

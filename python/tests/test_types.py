@@ -54,6 +54,8 @@ def test_types(tmp_path):
         reveal_type(dag.edit(cut=["box:0,0,0,1,1,1"], add=mesh, paste=[("b.vdag", (0, 0, 0))]))
         dag.edit(paste=["b.vdag"])
         voxdag.edit("a.vdag", fill=(0, 0, 0))
+        reveal_type(dag.dilate(2).erode(outside_set=True, threads=1))
+        dag.dilate(2, fill_color=(0, 0, 0))
     """)
     )
     checked = mypy(tmp_path, "--strict", "--allow-any-generics", "-p", "voxdag")
@@ -81,6 +83,8 @@ def test_types(tmp_path):
         'user.py:27: note: Revealed type is "voxdag._dag.Dag"',
         "user.py:28: error: List item 0",
         'user.py:29: error: Unexpected keyword argument "fill"',
-        "Found 11 errors",
+        'user.py:30: note: Revealed type is "voxdag._dag.Dag"',
+        'user.py:31: error: Unexpected keyword argument "fill_color"',
+        "Found 12 errors",
     ):
         assert expected in user, (expected, user)

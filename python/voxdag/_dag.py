@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         ExportReport,
         ExtractOptions,
         ExtractReport,
+        MorphologyOptions,
         RenderOptions,
         ReorderOptions,
         ReorderReport,
@@ -390,6 +391,41 @@ class Dag(DagFile):
         from ._derive import edit
 
         return edit(self, output, **options)
+
+    def dilate(
+        self,
+        voxels: SupportsIndex = 1,
+        output: Path | None = None,
+        **options: Unpack[MorphologyOptions],
+    ) -> Dag:
+        """Sets all voxels of the grid that are within `voxels` voxels of a set voxel on each axis,
+        and returns the Dag of the new file. So each set voxel becomes a cube of 2 * voxels + 1
+        voxels per edge. Voxels outside the grid are dropped. A new voxel has the attributes of the
+        nearest set voxel.
+
+        The options are color_resolution, no_attributes, memory, threads, force and progress, as in
+        voxdag.edit(). Without `output`, the new file is temporary. Raises Error if `voxels` is not
+        from 1 to 2^20, or for the reasons of voxdag.edit()."""
+        from ._derive import distance_of, edit
+
+        return edit(self, output, dilate=distance_of(voxels, "voxels", 1), **options)
+
+    def erode(
+        self,
+        voxels: SupportsIndex = 1,
+        output: Path | None = None,
+        *,
+        outside_set: bool = False,
+        **options: Unpack[MorphologyOptions],
+    ) -> Dag:
+        """Keeps only the voxels whose cube of 2 * voxels + 1 voxels per edge is completely set, and
+        returns the Dag of the new file. Voxels outside the grid count as not set, or as set if
+        `outside_set` is True. dilate(n).erode(n, outside_set=True) closes gaps and never removes a
+        set voxel. The other arguments and the errors are the same as for dilate()."""
+        from ._derive import distance_of, edit
+
+        distance = distance_of(voxels, "voxels", 1)
+        return edit(self, output, erode=distance, outside_set=outside_set, **options)
 
     def reorder(self, output: Path, **options: Unpack[ReorderOptions]) -> ReorderReport:
         """Writes a copy of this file with its nodes in another order. Takes the options of

@@ -8,7 +8,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from typing import Any, Literal, Optional, Union, cast
+from typing import Any, Literal, Optional, SupportsIndex, Union, cast
 
 from . import _native
 from ._build import Scene, native_scene
@@ -223,6 +223,9 @@ def edit(
     cut: Union[str, Sequence[str]] = (),
     add: Optional[Scene] = None,
     paste: Sequence[tuple[Path, tuple[int, int, int]]] = (),
+    dilate: SupportsIndex = 0,
+    erode: SupportsIndex = 0,
+    outside_set: bool = False,
     clip: bool = False,
     fill_color: Optional[tuple[int, int, int]] = None,
     color_resolution: int = 0,
@@ -232,8 +235,9 @@ def edit(
     force: bool = False,
     progress: Progress = None,
 ) -> Dag:
-    """Writes a changed copy of a .vdag file, and returns its Dag. The file's nodes must have the
-    order "hash". The edits are applied in this order: cut, add, paste.
+    """Writes a changed copy of a .vdag file, and returns its Dag. The edits are applied in this
+    order: cut, add, paste, dilate or erode. Unless the file is only dilated or eroded, its nodes
+    must have the order "hash".
 
     path, output      the .vdag file to read, and the .vdag file to write. By default, the output is
                       a temporary file, which is removed when the Dag is closed or no longer used.
@@ -247,6 +251,9 @@ def edit(
     paste             a list of pairs (file, (x, y, z)). The voxels of the file, a path or a Dag,
                       are added, so that its voxel 0, 0, 0 comes to the voxel x, y, z. The voxels of
                       both files must have the same size.
+    dilate, erode     a number of voxels N, at most 2^20; 0 means no change. See Dag.dilate() and
+                      Dag.erode(). Only one of them can be given.
+    outside_set       with `erode`: if True, voxels outside the grid count as set
     clip              if True, drops voxels that `paste` puts outside the grid. By default, such
                       voxels are an error.
     fill_color        if only one of the files has colors: the color of the cells in which this file
@@ -268,6 +275,7 @@ def edit(
     parts = [(path_text(part), _voxel_of(offset, "paste")) for part, offset in _pairs_of(paste)]
     fill = None if fill_color is None else _color_of(fill_color)
     cells = _cells_of(color_resolution)
+    distances = distance_of(dilate, "dilate"), distance_of(erode, "erode")
     with Dag(path) as dag:
         with_colors = bool(dag.attributes) and not no_attributes
     with _new_file(output, "edited.vdag") as new:
@@ -280,6 +288,8 @@ def edit(
                 shapes,
                 *scene_parts,
                 parts,
+                *distances,
+                bool(outside_set),
                 clip,
                 fill,
                 cells,
@@ -378,6 +388,15 @@ def _new_file(output: Optional[Path], name: str) -> Iterator[_NewFile]:
     except BaseException:
         new.remove()
         raise
+
+
+def distance_of(voxels: SupportsIndex, name: str, least: int = 0) -> int:
+    """Returns the distance of a dilation or an erosion, the argument `name`, as an int. Raises
+    Error if it is less than `least` or too large."""
+    distance = operator.index(voxels)
+    if not least <= distance <= 1 << 20:
+        raise Error(f"{name}={distance}: expected {least} to 2^20", "invalid_input")
+    return distance
 
 
 def _pairs_of(paste: Sequence[tuple[Path, tuple[int, int, int]]]) -> list[tuple[Any, Any]]:

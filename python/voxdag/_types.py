@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Union
+from typing import TYPE_CHECKING, Any, Literal, SupportsIndex, TypedDict, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,8 +186,22 @@ class EditOptions(TypedDict, total=False):
     cut: str | Sequence[str]
     add: Scene | None
     paste: Sequence[tuple[Path, tuple[int, int, int]]]
+    dilate: SupportsIndex
+    erode: SupportsIndex
+    outside_set: bool
     clip: bool
     fill_color: tuple[int, int, int] | None
+    color_resolution: int
+    no_attributes: bool
+    memory: int | str | None
+    threads: int
+    force: bool
+    progress: Progress
+
+
+class MorphologyOptions(TypedDict, total=False):
+    """Options of Dag.dilate() and Dag.erode()."""
+
     color_resolution: int
     no_attributes: bool
     memory: int | str | None

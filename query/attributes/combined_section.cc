@@ -1,7 +1,6 @@
 #include "query/attributes/combined_section.h"
 
 #include <algorithm>
-#include <functional>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -17,12 +16,13 @@
 #include "core/format/color/color_layout.h"
 #include "core/format/global/open_global.h"
 #include "core/geometry/morton.h"
+#include "query/attributes/attribute_source.h"
 #include "query/attributes/material_names.h"
 #include "query/attributes/placed_cube.h"
 #include "query/attributes/region_batches.h"
 #include "query/attributes/resident_pages.h"
-#include "query/attributes/stored_section.h"
 #include "query/dag/dag_view.h"
+#include "query/lookup/nearest.h"
 #include "voxdag/cells.h"
 
 namespace voxdag::query {
@@ -35,129 +35,6 @@ using voxdag_reader::ColorSection;
 // In this file, levels and codes are levels and Morton codes of the result's grid, except where a
 // name begins with `file_`: these are levels and codes of a source's grid. A region is a color
 // region (combined_section.h), and a tier is a group of seven levels (docs/format.md, "Colors").
-
-Position position_of(uint64_t code) {
-  uint32_t x, y, z;
-  morton_decode(code, x, y, z);
-  return {x, y, z};
-}
-
-// A file from which the result takes values.
-class Source {
- public:
-  Source(const voxdag_reader::File& file, Attribute attribute, uint32_t grid_levels,
-         const Position& offset, FileSystem& files, MemoryBudget& budget)
-      : stored_(file, attribute, files, budget),
-        attribute_(attribute),
-        dag_(file),
-        grid_levels_(grid_levels),
-        offset_(offset) {}
-
-  StoredSection& stored() { return stored_; }
-  const StoredSection& stored() const { return stored_; }
-  const ColorSection& section() const { return stored_.section(); }
-  const DagView& dag() const { return dag_; }
-
-  // Returns the level of the file whose cubes have the edge of the cubes of `level`. It is negative
-  // if these cubes are larger than the file's grid.
-  int64_t file_level(uint32_t level) const {
-    return static_cast<int64_t>(stored_.file().grid_levels()) - grid_levels_ + level;
-  }
-  // Returns finest_level_of() the file.
-  int64_t finest() const { return finest_level_of(stored_.file(), attribute_, grid_levels_); }
-  // True if each cube of `level` has the position of a cube of the file with the same edge, or is
-  // outside the file's grid.
-  bool is_aligned(uint32_t level) const {
-    const auto is_multiple = [&](int64_t distance) { return (distance & (edge(level) - 1)) == 0; };
-    return std::ranges::all_of(offset_, is_multiple);
-  }
-
-  // Calls visit(file_position, overlap) for the positions of the file's cubes of file_level(level)
-  // that overlap the cube at `code`, in the order of x, y and z. A position may be outside the
-  // file's grid. `overlap` is the common volume in voxels.
-  template <class Visit>
-  void for_each_overlap(uint32_t level, uint64_t code, const Visit& visit) const {
-    const Position at = position_of(code);
-    const int64_t size = edge(level);
-    Position first, rest;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const int64_t low = at[axis] * size - offset_[axis];
-      rest[axis] = low & (size - 1);
-      first[axis] = (low - rest[axis]) / size;
-    }
-    for (size_t i = 0; i < 8; ++i) {
-      Position position = first;
-      uint64_t overlap = 1;
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const bool is_upper = i >> (2 - axis) & 1;
-        position[axis] += is_upper;
-        overlap *= static_cast<uint64_t>(is_upper ? rest[axis] : size - rest[axis]);
-      }
-      if (overlap > 0) visit(position, overlap);
-    }
-  }
-
-  // Returns the Morton code of the file's cube at the place of the cube at `code`; nothing if the
-  // place is outside the file's grid. is_aligned(level) must be true.
-  std::optional<uint64_t> file_code(uint32_t level, uint64_t code) const {
-    std::optional<uint64_t> found;
-    for_each_overlap(level, code, [&](const Position& at, uint64_t) {
-      if (is_inside(level, at)) found = morton(at);
-    });
-    return found;
-  }
-
-  // Finds the value of a cell (combined_section.h): returns the region that has it, valid until
-  // the next call, and sets `i` to its index in the region. Returns null if no cube of the file
-  // that overlaps the cell has voxels. These voxels can be outside the cell if
-  // !is_aligned(level).
-  const ColorRegion* find(ColorCursor& cursor, uint32_t level, uint64_t code, uint64_t& i) const {
-    struct Candidate {
-      Position at;
-      uint64_t overlap;
-    };
-    std::array<Candidate, 8> candidates;
-    size_t count = 0;
-    for_each_overlap(level, code, [&](const Position& at, uint64_t overlap) {
-      candidates[count++] = {at, overlap};
-    });
-    const auto used = std::span(candidates).first(count);
-    if (count > 1) std::ranges::stable_sort(used, std::greater(), &Candidate::overlap);
-    for (const auto& [at, overlap] : used)
-      if (const ColorRegion* const region =
-              cursor.find(at[0], at[1], at[2], static_cast<uint32_t>(file_level(level)), i))
-        return region;
-    return nullptr;
-  }
-
-  // Verifies the file's values in the cube at `code`, down to the level `finest`.
-  void check_values(uint32_t finest, uint32_t level, uint64_t code) {
-    const auto file_finest = static_cast<uint32_t>(file_level(finest));
-    if (file_level(level) < 0) return stored_.check_values(file_finest, 0, 0);
-    for_each_overlap(level, code, [&](const Position& at, uint64_t) {
-      if (is_inside(level, at))
-        stored_.check_values(file_finest, static_cast<uint32_t>(file_level(level)), morton(at));
-    });
-  }
-
- private:
-  int64_t edge(uint32_t level) const { return int64_t{1} << (grid_levels_ - level); }
-  bool is_inside(uint32_t level, const Position& at) const {
-    const int64_t levels = file_level(level);
-    return levels >= 0 &&
-           std::ranges::all_of(at, [&](int64_t i) { return i >= 0 && i < int64_t{1} << levels; });
-  }
-  static uint64_t morton(const Position& at) {
-    return morton_encode(static_cast<uint32_t>(at[0]), static_cast<uint32_t>(at[1]),
-                         static_cast<uint32_t>(at[2]));
-  }
-
-  StoredSection stored_;
-  const Attribute attribute_;
-  const DagView dag_;
-  const uint32_t grid_levels_;  // levels of the result's grid
-  const Position offset_;
-};
 
 // An encoded region, and the index of the source from which it was copied; kEncoded if it was
 // encoded.
@@ -177,16 +54,17 @@ class CombinedColors {
         moved_b_(from.moved_b),
         moved_b_dag_(from.moved_b),
         fill_(from.fill),
+        has_nearest_(from.has_nearest),
         cancel_(cancel),
         levels_(from.levels),
         names_charge_(budget, 0, "lists of materials") {
     const uint32_t levels = result_.grid_levels();
     if (attribute.from_a)
-      sources_.push_back(
-          std::make_unique<Source>(from.a, attribute.attribute, levels, Position{}, files, budget));
+      sources_.push_back(std::make_unique<AttributeSource>(from.a, attribute.attribute, levels,
+                                                           Position{}, files, budget));
     if (attribute.from_b)
-      sources_.push_back(std::make_unique<Source>(from.b, attribute.attribute, levels, from.offset,
-                                                  files, budget));
+      sources_.push_back(std::make_unique<AttributeSource>(from.b, attribute.attribute, levels,
+                                                           from.offset, files, budget));
     // Without a fill color, B has a voxel in each cell in which A has none.
     tests_b_ = attribute.from_b && fill_ && !sources_.back()->is_aligned(levels_);
     below_.resize(color_layout::tier_count(levels_));
@@ -223,10 +101,10 @@ class CombinedColors {
     if (const auto from = copy_source(cube); from != kEncoded)
       return {copy(*sources_[from], 0, cube.code), from};
     for (const auto& source : sources_) source->check_values(levels_, level, cube.code);
-    std::vector<ColorCursor> cursors;
+    Readers readers;
     for (const auto& source : sources_)
-      cursors.emplace_back(source->stored().file(), source->section());
-    return {traits_.is_color() ? encode_colors(cube, cursors) : encode_valued(cube, cursors)};
+      readers.cursors.emplace_back(source->stored().file(), source->section());
+    return {traits_.is_color() ? encode_colors(cube, readers) : encode_valued(cube, readers)};
   }
 
   // Counts a written region for the region of the next coarser tier that contains it. Must be
@@ -308,7 +186,7 @@ class CombinedColors {
 
   // True if each region of the tier has the position and the levels of a region of the source, or
   // is outside the source's grid.
-  bool has_same_regions(const Source& source, uint32_t tier) const {
+  bool has_same_regions(const AttributeSource& source, uint32_t tier) const {
     return source.finest() == levels_ && source.is_aligned(region_level(tier)) &&
            source.file_level(region_level(tier)) >= 0 &&
            color_layout::levels_in_region(
@@ -330,7 +208,7 @@ class CombinedColors {
   }
   // True if a cube of the result and a cube of the source have the same finest cells. `content` and
   // `file_content` are the two cubes.
-  bool has_same_cells(const Source& source, uint32_t level, uint64_t content,
+  bool has_same_cells(const AttributeSource& source, uint32_t level, uint64_t content,
                       uint64_t file_content) const {
     if (level == levels_) return true;
     const auto file_level = static_cast<uint32_t>(source.file_level(level));
@@ -351,7 +229,7 @@ class CombinedColors {
     if (!traits_.is_color()) return kEncoded;
     const uint32_t level = region_level(0);
     for (size_t i = 0; i < sources_.size(); ++i) {
-      const Source& source = *sources_[i];
+      const AttributeSource& source = *sources_[i];
       if (!source.is_aligned(level)) return kEncoded;
       const auto file_code = source.file_code(level, cube.code);
       if (!file_code) continue;
@@ -369,8 +247,8 @@ class CombinedColors {
   // True if a region of a tier above the finest tier can be copied from the source. This is the
   // case if the source's region contains the same regions of the tier below, and all of them were
   // copied from the source.
-  bool is_copied_coarse(const Source& source, uint64_t copied, uint64_t regions, uint32_t tier,
-                        uint64_t code) const {
+  bool is_copied_coarse(const AttributeSource& source, uint64_t copied, uint64_t regions,
+                        uint32_t tier, uint64_t code) const {
     if (copied != regions || !has_same_regions(source, tier)) return false;
     const auto file_code = source.file_code(region_level(tier), code);
     if (!file_code) return false;
@@ -380,24 +258,52 @@ class CombinedColors {
                ColorSection::lower_bound(finer, *file_code << bits) ==
            regions;
   }
-  EncodedRegion copy(Source& source, uint32_t tier, uint64_t code) const {
+  EncodedRegion copy(AttributeSource& source, uint32_t tier, uint64_t code) const {
     const uint64_t file_code = *source.file_code(region_level(tier), code);
     source.check_values(finest_of(tier), region_level(tier), code);
     return source.stored().copy_region(source.section().tier(tier), file_code, code);
   }
 
+  // A cursor for each source, and the codes of the regions of the finest tier outside of the
+  // current region whose values in A are verified.
+  struct Readers {
+    std::vector<ColorCursor> cursors;
+    std::vector<uint64_t> verified;
+  };
+
+  // Finds the value of the cell of A that is nearest to a finest cell. Returns null if A has no
+  // value for this cell. Sets `i` as AttributeSource::find() does.
+  const ColorRegion* find_nearest_value(Readers& readers, uint64_t code, uint64_t& i) const {
+    AttributeSource& source = *sources_[0];
+    pages_->visit();
+    const Nearest nearest =
+        find_nearest(source.dag(), levels_, position_of(code), ~uint64_t{0} >> 1);
+    const uint64_t found = morton_encode(static_cast<uint32_t>(nearest.cell[0]),
+                                         static_cast<uint32_t>(nearest.cell[1]),
+                                         static_cast<uint32_t>(nearest.cell[2]));
+    const uint64_t region = found >> 3 * depth_of(0);
+    if (std::ranges::find(readers.verified, region) == readers.verified.end()) {
+      source.check_values(levels_, region_level(0), region);
+      readers.verified.push_back(region);
+    }
+    return source.find(readers.cursors[0], levels_, found, i);
+  }
+
   // Finds the value of a finest cell. Calls take(source, region, i) with the index of the source,
   // and the region and index of the value in the source. Calls none() if no source has a value.
   template <class Take, class None>
-  void find_value(std::vector<ColorCursor>& cursors, uint64_t code, const Take& take,
-                  const None& none) const {
+  void find_value(Readers& readers, uint64_t code, const Take& take, const None& none) const {
     for (size_t s = 0; s < sources_.size(); ++s) {
       const bool is_tested = tests_b_ && s + 1 == sources_.size();
       if (is_tested && !content_at(moved_b_dag_, levels_, code)) continue;
       uint64_t i = 0;
-      if (const ColorRegion* const region = sources_[s]->find(cursors[s], levels_, code, i))
+      if (const ColorRegion* const region = sources_[s]->find(readers.cursors[s], levels_, code, i))
         return take(s, *region, i);
     }
+    uint64_t i = 0;
+    const ColorRegion* const nearest =
+        has_nearest_ ? find_nearest_value(readers, code, i) : nullptr;
+    if (nearest) return take(0, *nearest, i);
     none();
   }
   [[noreturn]] void no_value(uint64_t code) const {
@@ -410,12 +316,12 @@ class CombinedColors {
     return static_cast<uint32_t>(code - (cube.code << 3 * depth_of(0)));
   }
 
-  EncodedRegion encode_colors(const PlacedCube& cube, std::vector<ColorCursor>& cursors) const {
+  EncodedRegion encode_colors(const PlacedCube& cube, Readers& readers) const {
     std::vector<ColoredCell> cells;
     walk(region_level(0), cube, levels_, [&](const PlacedCube& cell) {
       voxdag_reader::Rgb rgb;
       find_value(
-          cursors, cell.code,
+          readers, cell.code,
           [&](size_t, const ColorRegion& region, uint64_t i) { rgb = region.color(i); },
           [&] {
             if (!fill_) no_value(cell.code);
@@ -425,11 +331,11 @@ class CombinedColors {
     });
     return encode_region(depth_of(0), cube.code, cells);
   }
-  EncodedRegion encode_valued(const PlacedCube& cube, std::vector<ColorCursor>& cursors) const {
+  EncodedRegion encode_valued(const PlacedCube& cube, Readers& readers) const {
     std::vector<ValuedCell> cells;
     walk(region_level(0), cube, levels_, [&](const PlacedCube& cell) {
       find_value(
-          cursors, cell.code,
+          readers, cell.code,
           [&](size_t s, const ColorRegion& region, uint64_t i) {
             uint32_t value = sources_[s]->stored().value(region, i, levels_, cell.code);
             if (!indices_.empty()) value = indices_[s][value];
@@ -447,9 +353,10 @@ class CombinedColors {
   const voxdag_reader::File& moved_b_;
   const DagView moved_b_dag_;
   const std::optional<voxdag_reader::Rgb> fill_;
+  const bool has_nearest_;
   const CancelToken& cancel_;
   // A finest cell gets its value from the first source that has a value for it.
-  std::vector<std::unique_ptr<Source>> sources_;
+  std::vector<std::unique_ptr<AttributeSource>> sources_;
   // True if B, the last source, has values only in cells in which the moved B has voxels. This must
   // be tested, because its cubes do not align with the cells.
   bool tests_b_ = false;

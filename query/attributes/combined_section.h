@@ -7,7 +7,7 @@
 //
 //   1. A's value, if A has the attribute and a voxel in the cell;
 //   2. otherwise B's value, if B has the attribute and a voxel in the cell;
-//   3. otherwise the fill color.
+//   3. otherwise the value of A's nearest cell, or the fill color.
 //
 // A and B are the two files. If the finest cells of a file are larger than the cells of the result,
 // a cell of the result gets the value of the larger cell that contains it. If they are smaller, it
@@ -54,10 +54,14 @@ struct CombinedFiles {
   const voxdag_reader::File& moved_b;  // B's voxels in the result's grid
   // The voxel of the result's grid at which B's voxel (0, 0, 0) is placed.
   std::array<int64_t, 3> offset = {};
-  std::optional<voxdag_reader::Rgb> fill;
+  std::optional<voxdag_reader::Rgb> fill = {};
   // Level of the finest cells of the result. Files must not have the attribute if their grid is
   // smaller than these cells.
   uint32_t levels = 0;
+  // If true, a cell in which no file has a value has the value of the nearest cell of A with the
+  // same edge in which A has a voxel. The distance is measured between centers; on ties, the cell
+  // with the lowest Morton code is used. A must have all attributes, and a voxel.
+  bool has_nearest = false;
 };
 
 // Returns the level of the result whose cubes have the edge of the finest cells of an attribute of

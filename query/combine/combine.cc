@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/memory_budget.h"
 #include "core/base/options/option_text.h"
 #include "core/base/text.h"
 #include "core/format/global/diff.h"
@@ -14,31 +13,15 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/geometry/cube.h"
-#include "core/io/outputs/temporary_work.h"
 #include "query/attributes/color_levels.h"
 #include "query/attributes/combined_section.h"
-#include "query/combine/count_levels.h"
-#include "query/combine/join.h"
-#include "query/combine/level_writer.h"
 #include "query/combine/moved.h"
-#include "query/combine/pair_levels.h"
+#include "query/combine/new_file.h"
 #include "query/dag/locked_outputs.h"
-#include "query/dag/publish_file.h"
 #include "query/dag/refuse_order.h"
 
 namespace voxdag::query {
 namespace {
-
-// Divisors of the memory limit. The quotients are the memory of one list, one sorter (spill.h), the
-// values of one level, and one window of lookups (node_values.h). There are up to nine lists for
-// each level, and up to six sorters and four levels of values at any time.
-constexpr uint64_t kListShare = 1024;
-constexpr uint64_t kSorterShare = 32;
-constexpr uint64_t kValueShare = 10;
-constexpr uint64_t kWindowShare = 32;
-// The hashes of all nodes are in memory if they fit in memory_bytes / kHashShare.
-constexpr uint64_t kHashShare = 8;
-constexpr uint64_t kListBufferBytes = uint64_t{16} << 10;
 
 void refuse_unequal(const FirstFile& first, const voxdag_reader::File& b, bool is_moved) {
   const voxdag_reader::File& a = first.grid;
@@ -95,85 +78,6 @@ std::vector<CombinedAttribute> combined_attributes(const FirstFile& a, const vox
   return combined;
 }
 
-// The temporary folder of one combine() or cut(), its memory budget, and the budget's shares.
-struct Workspace {
-  Workspace(const CombineSpec& combine_spec, FileSystem& file_system)
-      : spec(combine_spec),
-        files(file_system),
-        budget(spec.memory_bytes),
-        folder(files, spec.output + ".work-"),
-        scratch(files, folder.path()),
-        space{scratch, budget, share(kListShare), share(kSorterShare),
-              std::min(spec.list_bytes, kListBufferBytes)},
-        memory{share(kValueShare), share(kWindowShare)} {}
-  uint64_t share(uint64_t divisor) const {
-    return std::min(spec.memory_bytes / divisor, spec.list_bytes);
-  }
-
-  const CombineSpec& spec;
-  FileSystem& files;
-  MemoryBudget budget;
-  const TemporaryWork folder;
-  ScratchFolder scratch;
-  const SpillSpace space;
-  const LookupMemory memory;
-};
-
-// The data from which write_levels() makes a new file. `joined` has the results of Join (join.h),
-// and `pairs` has the pairs and kept nodes (pair_levels.h); both have one element per level, and
-// index 0 is the root's level. `bricks` has the results of the pairs of bricks. `reference` is the
-// reference file (reference_of() in operation.h).
-struct NewLevels {
-  explicit NewLevels(const SpillSpace& space) : bricks(space) {}
-  std::vector<std::unique_ptr<JoinedLevel>> joined;
-  std::vector<std::unique_ptr<PairLevel>> pairs;
-  BrickResults bricks;
-  Outcome reference = Outcome::kEmpty;
-};
-
-struct NewCounts {
-  VoxelCounts octree;
-  uint64_t dag_nodes = 0;
-};
-
-// Writes the levels of a new file from `levels`, from the bricks up. Returns the numbers of voxels
-// and nodes. The new file has the resolution of `a`.
-NewCounts write_levels(DagInput& a, DagInput& b, NewLevels& levels, const Workspace& work,
-                       GlobalFileWriter& out, Progress& progress) {
-  const size_t count = levels.pairs.size();
-  progress.begin_stage("merge", count, "levels");
-  CountLevels counts(a, b, levels.reference, levels.bricks.counts, work.space, work.memory);
-  LevelsWriter writer(a, b, work.space, work.memory, counts, out);
-  writer.write_level(static_cast<uint32_t>(count - 1), *levels.joined.back(), *levels.pairs.back(),
-                     levels.bricks.rows);
-  progress.advance(1);
-  for (size_t level = count - 1; level-- > 0 && writer.dag_nodes() > 0;) {
-    SpillSorter<PairRow> rows(work.space);
-    writer.write_level(static_cast<uint32_t>(level), *levels.joined[level], *levels.pairs[level],
-                       rows);
-    progress.advance(1);
-  }
-  progress.end_stage();
-  if (writer.dag_nodes() == 0) return {};
-  const OctreeCounts total = counts.total();
-  return {{.voxels = total.voxels, .svo_nodes = total.nodes}, writer.dag_nodes()};
-}
-
-// Copies the levels of `from` to `out`.
-void copy_levels(DagInput& from, GlobalFileWriter& out) {
-  constexpr uint64_t kChunkWords = uint64_t{1} << 16;
-  for (uint32_t level = from.file().brick_level() + 1; level-- > 0;) {
-    const voxdag_reader::Level& words = from.level(level);
-    out.begin_level(level);
-    for (uint64_t first = 0; first < words.word_count; first += kChunkWords) {
-      const auto chunk = from.words(level, first, std::min(kChunkWords, words.word_count - first));
-      out.checksum_words(chunk);
-      out.write_words(first, chunk);
-    }
-    out.end_level({words.node_count, words.word_count});
-  }
-}
-
 // Attributes of a new file. `b` is the second file as it was given, and `offset` the place of its
 // voxel (0, 0, 0) in the grid of the first file.
 struct AttributeInputs {
@@ -199,79 +103,44 @@ class Combination {
         a_(a, work.spec.memory_bytes, cancel),
         b_(b, work.spec.memory_bytes, cancel),
         hash_space_(work.space) {
-    const uint64_t bytes = sizeof(uint64_t) * (a.dag_nodes() + b.dag_nodes());
-    if (bytes <= work.share(kHashShare)) hash_space_.list_bytes = bytes;
+    const uint64_t nodes = a.dag_nodes() + b.dag_nodes();
+    if (work.has_room_for_hashes(nodes)) hash_space_.list_bytes = sizeof(uint64_t) * nodes;
   }
 
   // Writes the output. Calls before_publish() just before the output gets its final name. If
   // before_publish() throws, the output is discarded.
   CombineReport run(const std::function<void()>& before_publish) {
-    GlobalFileWriter out = writer(work_.spec.output);
-    CombineReport report = attributes_.attributes.empty() ? write_voxels(out) : write_all(out);
-    if (report.voxels == 0) progress_.warn("the result has no voxels: the file will have no nodes");
-    report.grid = grid_of(a_.file());
-    finish(out, {.voxels = report.voxels, .svo_nodes = report.svo_nodes}, before_publish, report);
-    report.work_bytes += work_.scratch.bytes_written();
-    return report;
+    const auto write_attributes = [&](const voxdag_reader::File& result, GlobalFileWriter& out) {
+      const CombinedFiles from{
+          result,           a_.file(),         attributes_.b, b_.file(), attributes_.offset,
+          attributes_.fill, attributes_.levels};
+      for (const CombinedAttribute& attribute : attributes_.attributes)
+        write_combined_attribute(from, attribute, work_.files, out, work_.budget,
+                                 work_.spec.threads, progress_, cancel_);
+    };
+    NewFile file(a_.file(), work_, progress_, cancel_);
+    return file.write(
+        [&](GlobalFileWriter& out) { return write_voxels(out); },
+        attributes_.attributes.empty() ? NewFile::WriteAttributes() : write_attributes,
+        before_publish);
   }
 
  private:
-  GlobalFileWriter writer(const std::string& path) const {
-    return GlobalFileWriter(work_.files, path, grid_of(a_.file()), a_.file().hash_bits(),
-                            work_.spec.narrow_words);
-  }
-  void finish(GlobalFileWriter& out, const VoxelCounts& counts,
-              const std::function<void()>& before_publish, CombineReport& report) {
-    if (work_.spec.temporary) {
-      before_publish();
-      report.bytes = out.finish_temporary(counts);
-      return;
-    }
-    const GlobalFileSummary summary =
-        publish_file(out, counts, work_.spec.threads, before_publish, progress_, cancel_);
-    report.bytes = summary.bytes;
-    report.sha256 = summary.sha256;
-  }
   // Writes the levels of the new file. Returns a report with the numbers of voxels, nodes and
   // pairs.
   CombineReport write_voxels(GlobalFileWriter& out) {
     NewLevels levels(work_.space);
     const uint64_t pairs = find_levels(levels);
     const NewCounts counts = write_levels(a_, b_, levels, work_, out, progress_);
+    // From here on, only a file whose attributes are used is read.
+    a_.file().release_pages();
+    b_.file().release_pages();
+    attributes_.b.release_pages();
     CombineReport report;
     report.voxels = counts.octree.voxels;
     report.svo_nodes = counts.octree.svo_nodes;
     report.dag_nodes = counts.dag_nodes;
     report.pairs = pairs;
-    return report;
-  }
-  // Writes the levels and the attributes of the new file. The levels are written to a temporary
-  // file first, because the attributes follow from the set cells of the result.
-  CombineReport write_all(GlobalFileWriter& out) {
-    const std::string path = work_.folder.path() + "/levels.vdag";
-    GlobalFileWriter levels = writer(path);
-    CombineReport report = write_voxels(levels);
-    if (report.voxels == 0) return report;
-    // From here on, only a file whose attributes are used is read.
-    a_.file().release_pages();
-    b_.file().release_pages();
-    attributes_.b.release_pages();
-    cancel_.check();
-    report.work_bytes =
-        levels.finish_temporary({.voxels = report.voxels, .svo_nodes = report.svo_nodes});
-    const auto result = open_global_file(path);
-    const WatchedFile watched(*result);
-    watched.run([&] {
-      DagInput input(*result, work_.spec.memory_bytes, cancel_);
-      copy_levels(input, out);
-      const CombinedFiles from{*result,           a_.file(),          attributes_.b,
-                               b_.file(),         attributes_.offset, attributes_.fill,
-                               attributes_.levels};
-      for (const CombinedAttribute& attribute : attributes_.attributes)
-        write_combined_attribute(from, attribute, work_.files, out, work_.budget,
-                                 work_.spec.threads, progress_, cancel_);
-      watched.check_readable();
-    });
     return report;
   }
 

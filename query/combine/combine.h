@@ -5,6 +5,7 @@
 //   pair_levels.h   the pairs of cubes that must be combined, and the nodes to keep
 //   level_writer.h  the levels of the new file
 //   count_levels.h  the numbers of voxels and octree nodes
+//   new_file.h      the complete file
 //   moved.h         the second file at an offset, which is written to a temporary file first
 //   shape.h         spheres and boxes as the second operand
 //

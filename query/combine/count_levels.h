@@ -12,11 +12,11 @@
 #include <memory>
 #include <optional>
 
-#include "query/combine/dag_input.h"
 #include "query/combine/node_values.h"
 #include "query/combine/operation.h"
 #include "query/combine/pair_levels.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

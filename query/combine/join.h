@@ -14,9 +14,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "query/combine/dag_input.h"
 #include "query/combine/operation.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

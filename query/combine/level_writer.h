@@ -10,11 +10,11 @@
 
 #include "core/format/global/global_writer.h"
 #include "query/combine/count_levels.h"
-#include "query/combine/dag_input.h"
 #include "query/combine/join.h"
 #include "query/combine/pair_levels.h"
 #include "query/combine/result_rows.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

@@ -12,10 +12,10 @@
 #include <memory>
 #include <vector>
 
-#include "query/combine/dag_input.h"
 #include "query/combine/pair_levels.h"
 #include "query/combine/result_rows.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

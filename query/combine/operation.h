@@ -4,12 +4,11 @@
 
 #include <cstdint>
 
+#include "query/dag/dag_input.h"
+
 namespace voxdag::query {
 
 enum class Operation { kUnion, kMinus, kAnd, kXor };
-
-// An offset that stands for an empty cube, which has no node.
-inline constexpr uint64_t kNoNode = ~uint64_t{0};
 
 // The result of combining two cubes: nothing, the first file's cube, the second file's cube, or
 // unknown until their children are combined.

@@ -16,12 +16,12 @@
 #include <vector>
 
 #include "core/base/page_buffer.h"
-#include "query/combine/dag_input.h"
 #include "query/combine/join.h"
 #include "query/combine/operation.h"
 #include "query/combine/result_rows.h"
 #include "query/combine/shape.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

@@ -6,8 +6,8 @@
 #include <optional>
 
 #include "core/base/popcount8.h"
-#include "query/combine/dag_input.h"
 #include "query/combine/node_values.h"
+#include "query/dag/dag_input.h"
 #include "query/dag/dag_view.h"
 
 namespace voxdag::query {

@@ -16,7 +16,7 @@
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
 #include "core/base/popcount8.h"
-#include "query/combine/dag_input.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

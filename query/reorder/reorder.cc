@@ -9,7 +9,7 @@
 #include "core/format/global/open_global.h"
 #include "core/format/global/watched_file.h"
 #include "core/io/outputs/temporary_work.h"
-#include "query/combine/dag_input.h"
+#include "query/dag/dag_input.h"
 #include "query/dag/locked_outputs.h"
 #include "query/dag/publish_file.h"
 #include "query/reorder/order_levels.h"

@@ -19,8 +19,8 @@
 #include <span>
 
 #include "core/base/page_buffer.h"
-#include "query/combine/dag_input.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 

@@ -15,8 +15,9 @@
 #include "core/format/global/open_global.h"
 #include "core/format/verify/verify_checksums.h"
 #include "core/io/outputs/temporary_work.h"
-#include "query/combine/dag_input.h"
+#include "query/combine/operation.h"
 #include "query/combine/spill.h"
+#include "query/dag/dag_input.h"
 
 namespace voxdag::query {
 namespace {

@@ -91,6 +91,45 @@ TEST_F(Edit, Spheres) {
   EXPECT_EQ(cut["sha256"], run_json({"info", "c.vdag", "--digest"})["sha256"]);
 }
 
+// A dilation comes after the other edits. Closing (a dilation and then an erosion) keeps all
+// voxels.
+TEST_F(Edit, DilateAndErode) {
+  const std::string box = "box:32,32,64,64,64,96";
+  run_json({"edit", "a.vdag", "--cut", box, "-o", "hole.vdag"});
+  run_json({"edit", "hole.vdag", "--dilate", "3", "-o", "two.vdag"});
+  const Json one = run_json({"edit", "a.vdag", "--dilate", "3", "--cut", box, "-o", "one.vdag",
+                             "--memory", "64MiB", "--threads", "2"});
+  EXPECT_EQ(one["sha256"], run_json({"info", "one.vdag", "--digest"})["sha256"]);
+  expect_equal("one.vdag", "two.vdag");
+  EXPECT_EQ(run({"verify", "one.vdag"}).status, 0);
+  run_json({"edit", "one.vdag", "--erode", "3", "--outside-set", "-o", "closed.vdag"});
+  EXPECT_EQ(
+      run_json({"combine", "hole.vdag", "--minus", "closed.vdag", "-o", "none.vdag"})["voxels"], 0);
+  const Json opened = run_json({"edit", "a.vdag", "--erode", "1", "-o", "opened.vdag"});
+  EXPECT_LT(opened["voxels"], run_json({"info", "a.vdag"})["voxels"]);
+}
+
+TEST_F(Edit, DilationsWithAttributes) {
+  build({"a.glb"}, "a.vdag", {},
+        {"--color", "--attributes", "normal,material", "--color-resolution", "64", "--force"});
+  const Json dilated = run_json({"edit", "a.vdag", "--dilate", "2", "-o", "dilated.vdag"});
+  EXPECT_EQ(run_json({"info", "dilated.vdag"})["colors"]["resolution"], 64);
+  EXPECT_EQ(run({"verify", "dilated.vdag"}).status, 0);
+  run_json({"edit", "dilated.vdag", "--erode", "2", "--outside-set", "-o", "closed.vdag"});
+  EXPECT_EQ(run({"verify", "closed.vdag"}).status, 0);
+  const Json plain =
+      run_json({"edit", "a.vdag", "--dilate", "2", "--no-attributes", "-o", "plain.vdag"});
+  EXPECT_EQ(plain["voxels"], dilated["voxels"]);
+}
+
+TEST_F(Edit, RefusesDistances) {
+  for (const std::string distance : {"0", "-1", "1.5", "1048577", "x"})
+    expect_error(2, "1048576", {"edit", "a.vdag", "--dilate", distance, "-o", "x.vdag"});
+  expect_error(2, "--dilate", {"edit", "a.vdag", "--dilate", "1", "--erode", "1", "-o", "x.vdag"});
+  expect_error(2, "--outside-set was given without an erosion: expected --erode",
+               {"edit", "a.vdag", "--dilate", "1", "--outside-set", "-o", "x.vdag"});
+}
+
 // Cuts keep the colors of the other voxels, --add builds the scene with colors, and a part is
 // pasted with its colors.
 TEST_F(Edit, Colors) {
@@ -145,7 +184,7 @@ TEST_F(Edit, ChecksPartsFirst) {
 }
 
 TEST_F(Edit, RefusesBadArguments) {
-  expect_error(2, "no edit was given: expected --cut, --add or --paste",
+  expect_error(2, "no edit was given: expected --cut, --add, --paste, --dilate or --erode",
                {"edit", "a.vdag", "-o", "x.vdag"});
   expect_error(2, "shape 'cone:1'", {"edit", "a.vdag", "--cut", "cone:1", "-o", "x.vdag"});
   for (const std::string part : {"a.vdag", "a.vdag@", "a.vdag@1,2", "@1,2,3"})

@@ -137,7 +137,7 @@ def test_progress_and_temporary_file(file):
 @pytest.mark.parametrize(
     "options, message",
     [
-        ({}, "no edit was given: expected cut, add or paste"),
+        ({}, "no edit was given: expected cut, add, paste, dilate or erode"),
         ({"cut": "cube:1,2,3"}, "shape 'cube:1,2,3': expected"),
         ({"cut": ["box:0,0,0,1,1,1", "sphere:0.3,0,0,1"]}, "multiples of 0.5"),
         ({"cut": "box:0,0,0,4,4,4", "memory": "8MiB"}, "at least 64MiB"),
@@ -172,4 +172,4 @@ def test_refuses_outputs(file, tmp_path):
     with pytest.raises(voxdag.Error, match="reorder"):
         voxdag.edit(tmp_path / "other.vdag", cut="box:0,0,0,4,4,4")
     with pytest.raises(TypeError):
-        file.edit(cut="box:0,0,0,4,4,4", colour=True)
+        file.edit(cut="box:0,0,0,4,4,4", colors=True)

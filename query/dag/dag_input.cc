@@ -1,4 +1,4 @@
-#include "query/combine/dag_input.h"
+#include "query/dag/dag_input.h"
 
 #include <string>
 

@@ -13,10 +13,12 @@
 #include "core/format/global/checked_blocks.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/combine/operation.h"
 #include "voxdag/cancel_token.h"
 
 namespace voxdag::query {
+
+// An offset that stands for an empty cube, which has no node.
+inline constexpr uint64_t kNoNode = ~uint64_t{0};
 
 class DagInput {
  public:
