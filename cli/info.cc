@@ -4,12 +4,14 @@
 
 #include "cli/output.h"
 #include "cli/selection_options.h"
+#include "cli/terminal/progress_bar.h"
 #include "core/base/text.h"
 #include "core/base/text/printable.h"
 #include "core/fields/json_text.h"
 #include "core/format/checksum.h"
 #include "core/format/global/global_layout.h"
 #include "core/format/global/open_global.h"
+#include "query/components/components.h"
 #include "query/stats/level_stats.h"
 
 namespace voxdag::cli {
@@ -25,12 +27,16 @@ struct InfoCommand {
   bool csv = false;
   bool levels = false;
   bool json = false;
+  bool components = false;
+  unsigned connectivity = 26;
 };
 
 struct FileFacts {
   std::unique_ptr<voxdag_reader::File> file;
-  std::string sha256;                    // "" if not requested
-  std::optional<query::DagStats> stats;  // only with --stats
+  std::string sha256;                                 // "" if not requested
+  std::optional<query::DagStats> stats;               // only with --stats
+  std::optional<query::ComponentsReport> components;  // only with --components
+  unsigned connectivity = 26;
 };
 
 uint64_t level_bytes(const voxdag_reader::Level& level) {
@@ -74,6 +80,16 @@ std::string order_of(const voxdag_reader::File& file) {
   return name.empty() ? std::to_string(file.node_order()) : name;
 }
 
+ordered_json components_json(const FileFacts& facts) {
+  ordered_json largest = ordered_json::array();
+  for (const query::Component& c : facts.components->largest)
+    largest.push_back({{"voxels", c.voxels},
+                       {"box", {c.low[0], c.low[1], c.low[2], c.high[0], c.high[1], c.high[2]}}});
+  return {{"connectivity", facts.connectivity},
+          {"count", facts.components->components},
+          {"largest", largest}};
+}
+
 ordered_json info_json(const FileFacts& facts) {
   const voxdag_reader::File& file = *facts.file;
   ordered_json levels = ordered_json::array();
@@ -93,6 +109,7 @@ ordered_json info_json(const FileFacts& facts) {
       {"bits_per_voxel", bits_per_voxel(file)}};
   if (facts.stats) json["dag_nodes_2x2x2"] = dag_nodes_2(facts);
   json["levels"] = levels;
+  if (facts.components) json["components"] = components_json(facts);
   add_attribute_facts(file, json);
   if (!facts.sha256.empty()) json["sha256"] = facts.sha256;
   return json;
@@ -127,6 +144,7 @@ std::vector<ordered_json> csv_rows(const InfoCommand& command, const std::vector
     for (const char* name : {"file", "resolution", "voxels", "svo_nodes", "dag_nodes",
                              "dag_nodes_2x2x2", "bytes", "node_bytes", "bits_per_voxel", "sha256"})
       if (json.contains(name)) head[name] = json[name];
+    if (facts.components) head["components"] = facts.components->components;
     if (!command.levels) {
       rows.push_back(head);
       continue;
@@ -171,6 +189,17 @@ void print_levels(const FileFacts& facts) {
   }
 }
 
+void print_components(const FileFacts& facts) {
+  const query::ComponentsReport& report = *facts.components;
+  std::printf("  %s components (%u neighbors)%s\n", count_text(report.components).c_str(),
+              facts.connectivity,
+              report.components > report.largest.size() ? ", the largest are:" : "");
+  if (!report.largest.empty()) std::printf("           voxels  box\n");
+  for (const query::Component& c : report.largest)
+    std::printf("  %15s  %u,%u,%u,%u,%u,%u\n", count_text(c.voxels).c_str(), c.low[0], c.low[1],
+                c.low[2], c.high[0], c.high[1], c.high[2]);
+}
+
 void print(const FileFacts& facts) {
   const voxdag_reader::File& file = *facts.file;
   const double(&origin)[3] = file.origin();
@@ -202,15 +231,21 @@ void print(const FileFacts& facts) {
     if (const auto& names = section_of(file, row.attribute).names(); !names.empty())
       std::printf("  %s %s\n", count_text(names.size() - 1).c_str(), row.plural);
   print_levels(facts);
+  if (facts.components) print_components(facts);
 }
 
 FileFacts facts_of(const InfoCommand& command, const std::string& path, CommandContext& context) {
   FileFacts facts;
   facts.file = open_global_file(path);
   if (command.digest) facts.sha256 = sha256_of_file(*context.files.open_read(path), context.cancel);
-  if (!command.stats) return facts;
   MemoryBudget budget(memory_limit(command.memory));
-  facts.stats = query::dag_stats(*facts.file, budget, context.cancel);
+  if (command.stats) facts.stats = query::dag_stats(*facts.file, budget, context.cancel);
+  if (!command.components) return facts;
+  facts.connectivity = command.connectivity;
+  const query::ComponentRule rule{command.connectivity == 6 ? query::Connectivity::kFaces
+                                                            : query::Connectivity::kCorners};
+  const auto progress = make_progress_bar(false);
+  facts.components = query::find_components(*facts.file, rule, budget, *progress, context.cancel);
   return facts;
 }
 
@@ -235,12 +270,30 @@ void declare(Command& command, InfoCommand& state) {
       "--stats", state.stats,
       "also count the octree nodes of each level, the nodes by their children, and the DAG "
       "nodes with leaves of 2^3 voxels");
+  const Option components = command.flag(
+      "--components", state.components,
+      "also find the connected components of the voxels: their number, and the sizes and boxes of "
+      "the largest ones");
+  Option connectivity = command.text_option(
+      "--connectivity", "6|26",
+      [&state](const std::string& text) {
+        if (text != "6" && text != "26")
+          throw Error(ErrorCode::kInvalidInput,
+                      "--connectivity '" + text +
+                          "': expected 6 (voxels with a common face are connected) or 26 (also "
+                          "with a common edge or corner)");
+        state.connectivity = text == "6" ? 6 : 26;
+      },
+      "neighbors of a voxel that --components connects with it: 6 (common face), or 26 (also "
+      "common edge or corner; default)");
+  connectivity.needs(components);
   const Option csv = command.flag("--csv", state.csv, "print a table as CSV, one line per file");
   Option levels = command.flag("--levels", state.levels, "one line of CSV per level");
   levels.needs(csv);
-  command.option("--memory", state.memory,
-                 "limit of the memory that --stats allocates (default: half the RAM; at least "
-                 "64MiB)");
+  command.option(
+      "--memory", state.memory,
+      "limit of the memory that --stats and --components allocate (default: half the RAM; "
+      "at least 64MiB)");
   command.json_flag(state.json);
 }
 

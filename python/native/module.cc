@@ -33,6 +33,7 @@ NB_MODULE(_native, module) {
     }
   });
   voxdag::python::bind_build(module);
+  voxdag::python::bind_components(module);
   voxdag::python::bind_dag(module);
   voxdag::python::bind_derive(module);
   voxdag::python::bind_edit(module);

@@ -12,7 +12,7 @@ it raises `voxdag.Error`, whose attribute `code` names the kind of the error.
 """
 
 from ._build import Scene, build, plan
-from ._dag import Dag, Hits, open
+from ._dag import Dag, open
 from ._derive import combine, edit, export, export_formats, extract, reorder
 from ._error import Error
 from ._mesh import Mesh
@@ -20,11 +20,21 @@ from ._notebook import Viewer
 from ._progress import Progress
 from ._render import render
 from ._reports import BuildReport
-from ._types import Estimate, ExportReport, ExtractReport, NodeOrder, Region, ReorderReport
+from ._types import (
+    Components,
+    Estimate,
+    ExportReport,
+    ExtractReport,
+    Hits,
+    NodeOrder,
+    Region,
+    ReorderReport,
+)
 from ._voxels import from_dense, from_points, from_voxels
 
 __all__ = [
     "BuildReport",
+    "Components",
     "Dag",
     "Error",
     "Estimate",

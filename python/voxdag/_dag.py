@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,14 +12,15 @@ from . import _native
 from ._arguments import rows_of
 from ._error import Error, Path, thread_count
 from ._file import DagFile
-from ._indexing import BrickCells, Key, Voxel, bricks_of, element_of, voxels_of
-from ._types import Bools, Bytes, Doubles, Integers, Region
+from ._indexing import BrickCells, Key, Voxel, bricks_of, components_of, element_of, voxels_of
+from ._types import Bools, Bytes, Components, Doubles, Hits, Integers, Region
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._derive import Operation
     from ._notebook import Viewer
+    from ._progress import Progress
     from ._types import (
         EditOptions,
         ExportOptions,
@@ -37,28 +38,6 @@ if TYPE_CHECKING:
 _ATTRIBUTE_TYPES = {
     name: (components, np.dtype(dtype)) for name, components, dtype in _native.attribute_types()
 }
-
-
-class Hits(NamedTuple):
-    """The results of rays(): for each of N rays, the cell that it hits.
-
-    distance  distance from the origin of each ray to its hit, as an array (N,) of float64. It is in
-              voxels, or with world=True in the units of the scene. It is infinite if the ray hits
-              no cell.
-    voxel     low corner of the hit cell, as an array (N, 3) of int64. It is always in voxels. It is
-              -1, -1, -1 if the ray hits no cell.
-    normal    unit normal of the face through which the ray enters the cell, as an array (N, 3) of
-              int8. It is 0, 0, 0 if the ray begins in the cell, or hits no cell.
-    """
-
-    distance: Doubles
-    voxel: Integers
-    normal: NDArray[np.int8]
-
-    @property
-    def hit(self) -> Bools:
-        """An array (N,) of bool that is True for each ray that hits a cell."""
-        return np.isfinite(self.distance)
 
 
 def open(path: Path) -> Dag:
@@ -360,6 +339,26 @@ class Dag(DagFile):
         distances = np.empty(len(positions))
         self._dag.nearest(positions, float(max_distance), voxels, distances, thread_count(threads))
         return voxels, distances
+
+    def components(
+        self,
+        connectivity: int = 26,
+        largest: SupportsIndex = 10,
+        *,
+        memory: int | str | None = None,
+        progress: Progress = None,
+    ) -> Components:
+        """Finds the connected components of the voxels, and returns Components: their number, and
+        the `largest` largest ones, at most 1000000.
+
+        connectivity  6 connects voxels with a common face, 26 also voxels with a common edge or
+                      corner
+        memory        memory limit, as a number of bytes or as text such as "8GiB". The default is
+                      half of the machine's memory.
+        progress      as in build()
+
+        Raises Error if an argument is invalid, or if the memory limit is too small."""
+        return components_of(self, connectivity, largest, memory, progress)
 
     def bricks(self) -> Iterator[tuple[Voxel, BrickCells]]:
         """Iterates over the bricks of the grid, in Morton order. A brick is a cube of 4 x 4 x 4

@@ -1,4 +1,5 @@
-"""Indexes a Dag like an array of bool, and iterates over its voxels and bricks."""
+"""Indexes a Dag like an array of bool, iterates over its voxels and bricks, and finds its connected
+components."""
 
 from __future__ import annotations
 
@@ -8,6 +9,11 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, Union
 
 import numpy as np
 from numpy.typing import NDArray
+
+from . import _native
+from ._error import Error, memory_text
+from ._progress import Progress, shown
+from ._types import Components
 
 if TYPE_CHECKING:
     from types import EllipsisType
@@ -21,6 +27,7 @@ Key = Union[_Item, tuple[_Item, ...]]
 
 _BLOCK_LEVELS = 6  # voxels and bricks are read in blocks of 64 x 64 x 64 voxels
 _BRICK_LEVELS = 2
+_MAX_COMPONENTS = 1_000_000  # listed components
 
 
 def element_of(dag: Dag, key: Any) -> bool | NDArray[np.bool_]:
@@ -99,3 +106,24 @@ def _blocks_of(dag: Dag) -> Iterator[tuple[Voxel, Voxel]]:
     edge = 1 << min(levels, _BLOCK_LEVELS)
     for x, y, z in (dag.points(level=max(0, levels - _BLOCK_LEVELS)) * edge).tolist():
         yield (x, y, z), (x + edge, y + edge, z + edge)
+
+
+def components_of(
+    dag: Dag,
+    connectivity: int,
+    largest: SupportsIndex,
+    memory: int | str | None,
+    progress: Progress,
+) -> Components:
+    """Returns the components of dag.components()."""
+    if connectivity not in (6, 26):
+        raise Error(f"connectivity={connectivity!r}: expected 6 or 26", "invalid_input")
+    rows = operator.index(largest)
+    if not 0 <= rows <= _MAX_COMPONENTS:
+        raise Error(f"largest={rows}: expected 0 to {_MAX_COMPONENTS}", "invalid_input")
+    with shown(progress) as callback:
+        total, found = _native.components(
+            dag.path, connectivity == 26, rows, memory_text(memory), callback
+        )
+    voxels = np.array([size for size, _ in found], np.int64)
+    return Components(total, voxels, np.array([box for _, box in found], np.int64).reshape(-1, 6))

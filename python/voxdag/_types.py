@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, SupportsIndex, TypedDict, Union
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex, TypedDict, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class SceneWarning(TypedDict):
     code: str
     place: str
     message: str
-    count: int
+    total: int
 
 
 class SolidEstimate(TypedDict):
@@ -250,3 +250,40 @@ Bools = NDArray[np.bool_]
 Bytes = NDArray[np.uint8]
 Doubles = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+
+class Hits(NamedTuple):
+    """The results of rays(): for each of N rays, the cell that it hits.
+
+    distance  distance from the origin of each ray to its hit, as an array (N,) of float64. It is in
+              voxels, or with world=True in the units of the scene. It is infinite if the ray hits
+              no cell.
+    voxel     low corner of the hit cell, as an array (N, 3) of int64. It is always in voxels. It is
+              -1, -1, -1 if the ray hits no cell.
+    normal    unit normal of the face through which the ray enters the cell, as an array (N, 3) of
+              int8. It is 0, 0, 0 if the ray begins in the cell, or hits no cell.
+    """
+
+    distance: Doubles
+    voxel: Integers
+    normal: NDArray[np.int8]
+
+    @property
+    def hit(self) -> Bools:
+        """An array (N,) of bool that is True for each ray that hits a cell."""
+        return np.isfinite(self.distance)
+
+
+class Components(NamedTuple):
+    """The results of components(): connected components of voxels.
+
+    total   number of components
+    voxels  number of voxels of each of the K largest components, as an array (K,) of int64. The
+            largest component comes first.
+    boxes   box of each of these components, as an array (K, 6) of int64. A row is a region: x, y, z
+            of the low corner, which is in the box, and of the high corner, which is not.
+    """
+
+    total: int
+    voxels: Integers
+    boxes: Integers

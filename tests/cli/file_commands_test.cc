@@ -343,5 +343,30 @@ TEST_F(FileCommands, InfoCountsTheOctreeAndTheChildren) {
   expect_error(2, "--csv", {"info", "m.vdag", "--levels"});
 }
 
+TEST_F(FileCommands, InfoFindsComponents) {
+  run_json({"edit", "m.vdag", "--cut", "box:60,0,0,68,128,128", "-o", "cut.vdag"});
+  const Json info = run_json({"info", "cut.vdag", "--components", "--memory", "64MiB"});
+  const Json& found = info["components"];
+  EXPECT_EQ(found["connectivity"], 26);
+  ASSERT_GE(found["count"], 2);
+  ASSERT_EQ(found["largest"].size(), std::min<size_t>(10, found["count"].get<size_t>()));
+  for (const Json& component : found["largest"]) {
+    EXPECT_LE(component["voxels"], found["largest"][0]["voxels"]);
+    EXPECT_TRUE(component["box"][0] >= 68 || component["box"][3] <= 60) << component;
+  }
+  const Json by_faces =
+      run_json({"info", "cut.vdag", "--components", "--connectivity", "6"})["components"];
+  EXPECT_EQ(by_faces["connectivity"], 6);
+  EXPECT_GE(by_faces["count"], found["count"]);
+  const std::string text = run({"info", "cut.vdag", "--components"}).out;
+  EXPECT_NE(text.find(" components (26 neighbors)"), std::string::npos) << text;
+  const std::string table = run({"info", "cut.vdag", "--components", "--csv"}).out;
+  EXPECT_NE(table.find(",components\n"), std::string::npos) << table;
+  EXPECT_TRUE(table.ends_with("," + found["count"].dump() + "\n")) << table;
+  expect_error(2, "expected 6 (voxels with a common face",
+               {"info", "cut.vdag", "--components", "--connectivity", "18"});
+  expect_error(2, "--components", {"info", "cut.vdag", "--connectivity", "6"});
+}
+
 }  // namespace
 }  // namespace command_line
