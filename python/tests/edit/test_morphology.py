@@ -77,6 +77,18 @@ def test_colors_are_those_of_the_nearest_voxel():
     assert np.allclose(kept.colors(points), dilated.colors(points), atol=48)
 
 
+def test_all_attributes_are_those_of_the_nearest_voxel(mesh, tmp_path):
+    attributes = ["alpha", "normal", "material"]
+    voxdag.build(mesh, resolution=64, output=tmp_path / "a.vdag", attributes=attributes)
+    dag = voxdag.open(tmp_path / "a.vdag")
+    dilated = dag.dilate(3, memory="64MiB", threads=2)
+    points = dilated.points()
+    nearest, _ = dag.nearest(points)
+    assert set(dilated.attributes) == set(dag.attributes) >= set(attributes)
+    for name in ("alphas", "normals", "materials"):
+        assert np.array_equal(getattr(dilated, name)(points), getattr(dag, name)(nearest)), name
+
+
 @pytest.mark.parametrize("distance", [0, -1, 1 << 21, 1 << 70])
 def test_refuses_distances(dag, distance):
     for change in (dag.dilate, dag.erode):
