@@ -81,9 +81,9 @@ VOXDAG_SLICES_INLINE Words grow(const Words& reached, const Words& empty) {
 
 // True if a voxel of `a` shares a face with a voxel of `b`.
 VOXDAG_SLICES_INLINE bool touch(const Words& a, const Words& b) {
-  const Words beside = move_up<1>(b) | move_down<1>(b) | (b << 8) | (b >> 8) |
-                       ((b << 1) & ~kLowZ) | ((b >> 1) & ~(kLowZ << 7));
-  return !is_zero(a & beside);
+  const Words around = move_up<1>(b) | move_down<1>(b) | (b << 8) | (b >> 8) | ((b << 1) & ~kLowZ) |
+                       ((b >> 1) & ~(kLowZ << 7));
+  return !is_zero(a & around);
 }
 
 VOXDAG_SLICES_INLINE Words flood(const Words& empty, const Words& from) {
