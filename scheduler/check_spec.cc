@@ -63,7 +63,8 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
   const GeometryOptions& g = spec.geometry;
   if (g.resolution || !g.voxel_size) return spec;
   BuildSpec out = spec;
-  out.geometry.resolution = kMaxOptionEdge;  // checked() accepts any valid value
+  // checked() accepts any valid value, and it also compares the radius with the resolution.
+  out.geometry.resolution = g.radius > 0 ? kMaxRadiusResolution : kMaxOptionEdge;
   const BuildSpec full = checked(out);
   MemoryBudget budget(full.run.memory_bytes);
   const auto scene =

@@ -11,8 +11,8 @@
 #include "core/fields/json_text.h"
 #include "core/format/global/open_global.h"
 #include "core/io/overwrite.h"
+#include "scheduler/check_spec.h"
 #include "scheduler/spec/build_report.h"
-#include "scheduler/state/job/build_job.h"
 #include "scheduler/state/work_folder.h"
 
 namespace voxdag {
@@ -47,8 +47,9 @@ std::optional<BuildReport> report_of_output(FileSystem& files, const RunOptions&
 
 // Returns names as the JSON of a report contains them: bytes that are not UTF-8 become U+FFFD.
 std::vector<std::string> as_reported(const std::vector<std::string>& names) {
-  const FieldJson json = names;
-  return parse_json<FieldJson>(json_text(json)).get<std::vector<std::string>>();
+  std::vector<std::string> out;
+  for (const std::string& name : names) out.push_back(as_utf8(name));
+  return out;
 }
 
 }  // namespace
@@ -69,6 +70,18 @@ void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
                                             (report ? " by " + joined(scenes) : "") +
                                             ": expected another output" +
                                             (force.empty() ? "" : "; " + force + " replaces it"));
+}
+
+void guard_outputs(GuardedOutputs& files, const RunOptions& run) {
+  files.guard_output(run.output);
+  if (const std::string path = report_path(run); !path.empty()) files.guard_output(path);
+}
+
+void check_changed_output(BuildJob& job, GuardedOutputs& files) {
+  if (files.is_unchanged(job.spec.run.output)) return;
+  refuse_result_of_other_scene(files, job.spec);
+  check_places(job.spec, job.scene, job.context);
+  guard_outputs(files, job.spec.run);
 }
 
 }  // namespace voxdag

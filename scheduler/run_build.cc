@@ -10,13 +10,14 @@
 #include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
-#include "core/io/outputs/guarded_outputs.h"
 #include "core/io/outputs/space_reserve.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/cluster/advice_on_tasks.h"
 #include "scheduler/cluster/cluster.h"
+#include "scheduler/replaced_result.h"
 #include "scheduler/solid/seed.h"
 #include "scheduler/solid/solid_report.h"
+#include "scheduler/spec/unbuildable_job.h"
 #include "scheduler/stages/attributes/attribute_sections.h"
 #include "scheduler/stages/build/thread_builder.h"
 #include "scheduler/stages/enclose/enclose_stage.h"
@@ -27,7 +28,6 @@
 #include "scheduler/stages/publish/publish_stage.h"
 #include "scheduler/stages/reorder/reorder_stage.h"
 #include "scheduler/state/full_disk_advice.h"
-#include "scheduler/state/job/build_job.h"
 
 namespace voxdag {
 namespace {
@@ -390,9 +390,10 @@ void run_stages(BuildJob& job, SubvolumeBuilder& builder, double start_s) {
   remove_finished_work(job);
 }
 
-// True if the work folder has something to resume: a job, or the checkpoint of a partly read scene.
-// The checkpoint does not count if the scene caused the error.
+// True if the work folder has something to resume: a job, or the checkpoint of a partly read scene
+// that did not cause the error. In a cluster build, several processes share a job's folder.
 bool is_worth_resuming(BuildJob& job, const Error& error) {
+  if (dynamic_cast<const UnbuildableJob*>(&error) != nullptr && !job.spec.run.cluster) return false;
   const bool scene_is_at_fault =
       error.code() == ErrorCode::kInvalidInput || error.code() == ErrorCode::kLimit;
   return job.store->job() || (!scene_is_at_fault && job.checkpoint.has_saved());
@@ -439,9 +440,10 @@ void run_as_merge_job(BuildJob& job, double start_s) {
   run_stages(job, *make_cluster_builder(job), start_s);
 }
 
-BuildReport run_here(BuildJob& job) {
+BuildReport run_here(BuildJob& job, GuardedOutputs& files) {
   const double start_s = wall_seconds();
   resumable(job, [&] {
+    check_changed_output(job, files);
     if (is_merge_job(job.spec)) return run_as_merge_job(job, start_s);
     if (job.spec.run.cluster) return run_stages(job, *make_cluster_builder(job), start_s);
     ThreadBuilder builder(job);
@@ -452,9 +454,10 @@ BuildReport run_here(BuildJob& job) {
 
 // Submits the tasks and the merge job. Returns the merge job's id, or "" if the merge job or its
 // output already exists.
-std::string submit_merge_job(BuildJob& job, MergeJob& merge_job) {
+std::string submit_merge_job(BuildJob& job, MergeJob& merge_job, GuardedOutputs& files) {
   std::string id;
   resumable(job, [&] {
+    check_changed_output(job, files);
     if (!job.start_over && merge_job.finished()) return remove_finished_work(job);
     if (!job.start_over && merge_job.is_alive()) return;
     merge_job.forget_finished();
@@ -472,8 +475,7 @@ BuildReport run_build(const BuildSpec& requested, const BuildContext& caller) {
   const BuildSpec spec = checked(with_resolution(requested, caller));
   SpaceReserve reserve(caller.files, spec.run.min_free_bytes);
   GuardedOutputs files(reserve);
-  files.guard_output(spec.run.output);
-  if (const std::string path = report_path(spec.run); !path.empty()) files.guard_output(path);
+  guard_outputs(files, spec.run);
   const BuildContext context{files, caller.progress, caller.cancel};
   MemoryBudget budget(spec.run.memory_bytes);
   BuildScene scene(spec.geometry, work_folder_of(spec.run), budget, context);
@@ -482,14 +484,14 @@ BuildReport run_build(const BuildSpec& requested, const BuildContext& caller) {
   if (spec.run.restart) stop_earlier_merge_job(spec, context);
   if (!spec.run.cluster || !spec.run.cluster->merge_job) {
     BuildJob job(spec, scene, budget, context);
-    return run_here(job);
+    return run_here(job, files);
   }
   const auto merge_job = make_merge_job(spec, scene.open(), context);
   std::string id;
   const bool is_over = merge_job->finished() && !merge_job->has_remaining_work();
   if (spec.run.restart || !(is_over || merge_job->is_alive())) {
     BuildJob job(spec, scene, budget, context);
-    id = submit_merge_job(job, *merge_job);
+    id = submit_merge_job(job, *merge_job, files);
   }
   scene.close();
   return merge_job->follow(id);

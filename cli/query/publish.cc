@@ -30,12 +30,20 @@ struct PublishCommand {
   unsigned threads = default_threads();
 };
 
+// Throws Error{kInvalidInput} if the value of an option is not valid UTF-8, as JSON and HTML
+// require.
+void refuse_other_encoding(const std::string& option, const std::string& value) {
+  if (as_utf8(value) != value)
+    throw Error(ErrorCode::kInvalidInput,
+                option + " " + value + ": expected text that is valid UTF-8");
+}
+
 // Returns the title of the page: --title, or the name of the input file without its folder and
 // ending.
 std::string title_of(const PublishCommand& command) {
   if (!command.title.empty()) return command.title;
   const std::string name = command.input.substr(command.input.rfind('/') + 1);
-  return name.substr(0, name.rfind('.'));
+  return as_utf8(name.substr(0, name.rfind('.')));
 }
 
 // Returns the URL of the published folder, with a slash at the end, or "" if it is not given.
@@ -137,6 +145,8 @@ void run(const PublishCommand& command, CommandContext& context) {
   query::PackageSpec spec;
   spec.output = command.output;
   spec.colors = !command.gray;
+  refuse_other_encoding("--title", command.title);
+  refuse_other_encoding("--url", command.url);
   url_of(command.url);  // throws before any work is done
   spec.pack_bytes = pack_bytes_of(command.pack_size.empty() ? "8MiB" : command.pack_size);
   spec.memory_bytes = memory_limit(command.memory);

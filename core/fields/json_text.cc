@@ -11,6 +11,10 @@ std::string json_text(const Json& value, int indent) {
   return value.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
+std::string as_utf8(const std::string& text) {
+  return nlohmann::json::parse(json_text(nlohmann::json(text))).get<std::string>();
+}
+
 template <class Json>
 std::string ascii_json_text(const Json& value) {
   return value.dump(-1, ' ', true, Json::error_handler_t::replace);

@@ -15,6 +15,8 @@ namespace voxdag {
 // scenes can contain, by U+FFFD.
 template <class Json>
 std::string json_text(const Json& value, int indent = -1);
+// Returns the text as json_text() writes it: bytes that are not valid UTF-8 become U+FFFD.
+std::string as_utf8(const std::string& text);
 // Like json_text() on one line, but escapes all characters outside of ASCII.
 template <class Json>
 std::string ascii_json_text(const Json& value);

@@ -3,6 +3,7 @@
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
 #include "core/base/text.h"
+#include "scheduler/spec/unbuildable_job.h"
 
 namespace voxdag {
 namespace {
@@ -52,15 +53,16 @@ CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels
 
 void refuse_seed_in_shell(const Seed& seed) {
   if (seed.radius > 0)
-    throw Error(ErrorCode::kInvalidInput,
-                option_text("seed", seed.text) + ": the surface touches the cube of " +
-                    std::to_string(seed.radius + 1) + " voxels per edge around this point, which " +
-                    option_text("radius", std::to_string(seed.radius)) +
-                    " needs: expected a point farther from surfaces, or a smaller radius");
-  throw Error(ErrorCode::kInvalidInput,
-              option_text("seed", seed.text) +
-                  ": the surface touches the voxel of this point: expected a "
-                  "point in empty space, at least a voxel away from surfaces");
+    throw UnbuildableJob(ErrorCode::kInvalidInput,
+                         option_text("seed", seed.text) + ": the surface touches the cube of " +
+                             std::to_string(seed.radius + 1) +
+                             " voxels per edge around this point, which " +
+                             option_text("radius", std::to_string(seed.radius)) +
+                             " needs: expected a point farther from surfaces, or a smaller radius");
+  throw UnbuildableJob(ErrorCode::kInvalidInput,
+                       option_text("seed", seed.text) +
+                           ": the surface touches the voxel of this point: expected a "
+                           "point in empty space, at least a voxel away from surfaces");
 }
 
 }  // namespace voxdag

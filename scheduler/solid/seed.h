@@ -33,8 +33,8 @@ std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cu
 // positions. `radius` is V, and `grid_levels` are the levels of the grid of the voxels.
 CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels);
 
-// Throws Error{kInvalidInput} with the message that a triangle touches the seed's voxel or, in a
-// build with a radius, a voxel of the walking cube at its start position.
+// Throws UnbuildableJob{kInvalidInput} with the message that a triangle touches the seed's voxel
+// or, in a build with a radius, a voxel of the walking cube at its start position.
 [[noreturn]] void refuse_seed_in_shell(const Seed& seed);
 
 }  // namespace voxdag

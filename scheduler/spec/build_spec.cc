@@ -10,10 +10,6 @@
 namespace voxdag {
 namespace {
 
-// Maximum resolution of a build with a radius. Such a build also needs a grid of twice its
-// resolution (stages/enclose/cube_walks.h), which can have at most kMaxGridLevels levels.
-constexpr uint64_t kMaxRadiusResolution = uint64_t{1} << (kMaxGridLevels - 1);
-
 // Calls `action(field, value)` for every field. `value` is the option as JSON; null if the option
 // is not set.
 template <class Action>

@@ -11,6 +11,7 @@
 #include "core/base/memory_budget.h"
 #include "core/base/progress.h"
 #include "core/color/attribute_set.h"
+#include "core/geometry/cube.h"
 #include "core/geometry/grid.h"
 #include "core/geometry/solid_rule.h"
 #include "core/geometry/voxel_rule.h"
@@ -69,6 +70,10 @@ inline SolidRule solid_rule_of(const GeometryOptions& options) {
   return options.solid == SolidName::kEnclosed ? SolidRule::kNone
                                                : static_cast<SolidRule>(options.solid);
 }
+
+// Maximum resolution of a build with a radius. Such a build also needs a grid of twice its
+// resolution (stages/enclose/cube_walks.h), which can have at most kMaxGridLevels levels.
+inline constexpr uint64_t kMaxRadiusResolution = uint64_t{1} << (kMaxGridLevels - 1);
 
 // Returns the geometry options as one line of JSON, for comparing jobs and for messages. Scenes are
 // left out because only their content matters.

@@ -128,6 +128,10 @@ TEST_F(BuildCommand, FindsTheResolutionOfAVoxelSize) {
     EXPECT_EQ(report["resolution"], row.resolution);
     EXPECT_EQ(report["bounds"]["edge"], std::stod(row.voxel_size) * row.resolution);
   }
+  const Json sealed = run_json({"build", "m.glb", "--voxel-size", "0.1", "--solid", "enclosed",
+                                "--radius", "3", "-o", "m.vdag"});
+  EXPECT_EQ(sealed["resolution"], 128);
+  EXPECT_EQ(sealed["solid"]["radius"], 3);
   const std::string alone = build({"--voxel-size", "0.1"})["sha256"];
   EXPECT_EQ(run_json({"build", "m.glb", "--voxel-size", "0.1", "-o", "m.vdag"})["sha256"], alone);
   const Json plan = run_json({"plan", "m.glb", "--voxel-size", "0.05"});
@@ -163,8 +167,11 @@ TEST_F(BuildCommand, KeepsResultsOfOtherScenes) {
 }
 
 TEST_F(BuildCommand, WritesTheReportWhereItIsWanted) {
-  build({"--report", "none"});
+  const Json printed = build({"--report", "none", "--solid", "enclosed"});
   EXPECT_FALSE(exists("m.vdag.report.json"));
+  EXPECT_GT(printed["wall_s"], 0);
+  EXPECT_FALSE(printed["stages"].empty());
+  EXPECT_TRUE(printed.contains("solid"));
   const Json report = build({"--report", "reports/m.json"}, "n.vdag");
   EXPECT_FALSE(exists("n.vdag.report.json"));
   EXPECT_EQ(Json::parse(contents("reports/m.json")), report);
@@ -173,6 +180,27 @@ TEST_F(BuildCommand, WritesTheReportWhereItIsWanted) {
   for (const char* path : {"letter.txt", "x.vdag", "x.vdag.partial", "-"})
     expect_error(2, path, {"build", "m.glb", "-r", "64", "-o", "x.vdag", "--report", path});
   EXPECT_EQ(contents("letter.txt"), "dear");
+}
+
+// If no run of a job can succeed, its work folder is removed, so the corrected command is not
+// refused because of another job in the folder.
+TEST_F(BuildCommand, ACorrectedOptionNeedsNoRestart) {
+  const std::vector<std::string> seeded = {"build", "m.glb",  "-r",      "64",
+                                           "-o",    "s.vdag", "--solid", "enclosed"};
+  const auto with = [](std::vector<std::string> command, const std::vector<std::string>& more) {
+    command.insert(command.end(), more.begin(), more.end());
+    return command;
+  };
+  expect_error(2, "the surface touches", with(seeded, {"--seed", "0,0.5,0.5"}));
+  EXPECT_FALSE(exists("s.vdag.work"));
+  expect_error(2, "the surface touches", with(seeded, {"--seed", "1.5,3.2,4.5", "--radius", "9"}));
+  EXPECT_FALSE(exists("s.vdag.work"));
+  EXPECT_EQ(run(with(seeded, {"--seed", "4.5,4.5,4.5"})).status, 0);
+  put("p.csv", "1,1,1\n5,5,5\n");
+  const std::vector<std::string> thin = {"build", "p.csv", "-r", "16", "-o", "t.vdag", "--thin"};
+  expect_error(2, "sets a voxel", thin);
+  EXPECT_FALSE(exists("t.vdag.work"));
+  EXPECT_EQ(run(with(thin, {"--point-radius", "0.5"})).status, 0);
 }
 
 // Results are not written to the standard output, and there is no file with the name "-".

@@ -68,6 +68,12 @@ TEST_F(View, IsPublished) {
   EXPECT_NE(contents("p/index.html").find("content=\"https://example.org/p/poster-"),
             std::string::npos);
   const Json checked = run_json({"publish", "--check", "p"});
+  // File names can have any bytes; the page shows those that are not UTF-8 as U+FFFD.
+  put("\xff.vdag", contents("m.vdag"));
+  EXPECT_EQ(run({"publish", "\xff.vdag", "-o", "r"}).status, 0);
+  EXPECT_NE(contents("r/index.html").find("\xef\xbf\xbd"), std::string::npos);
+  expect_error(2, "expected text that is valid UTF-8",
+               {"publish", "m.vdag", "-o", "t", "--title", "\xff"});
   for (const char* member : {"packs", "tiles", "color_pages"})
     EXPECT_EQ(checked[member], report[member]) << member;
   EXPECT_NE(run({"publish", "--check", "p/"}).out.find("intact"), std::string::npos);

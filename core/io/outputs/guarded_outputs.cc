@@ -23,6 +23,11 @@ void GuardedOutputs::guard_output(const std::string& path) {
   guard(path + ".partial");
 }
 
+bool GuardedOutputs::is_unchanged(const std::string& path) {
+  const auto guarded = find(path);
+  return !guarded || (guarded->exists ? is_at(path, *guarded) : !file_at(path, false).exists);
+}
+
 std::unique_ptr<WritableFile> GuardedOutputs::create(const std::string& path) {
   const auto guarded = find(path);
   if (!guarded) return ForwardingFiles::create(path);

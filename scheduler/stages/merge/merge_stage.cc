@@ -8,6 +8,7 @@
 #include "core/base/options/option_text.h"
 #include "merge/merge.h"
 #include "scheduler/solid/full_cubes.h"
+#include "scheduler/spec/unbuildable_job.h"
 
 namespace voxdag {
 namespace {
@@ -66,8 +67,8 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
 
 namespace {
 
-// Handles a scene whose triangles set no voxel: throws Error{kInvalidInput}, or only warns if the
-// build has --allow-empty.
+// Handles a scene whose triangles set no voxel: throws UnbuildableJob{kInvalidInput}, or only warns
+// if the build has --allow-empty.
 void check_voxels(const BuildJob& job) {
   const GeometryOptions& geometry = job.spec.geometry;
   std::string message = "none of the " + std::to_string(job.report.triangles) +
@@ -79,9 +80,9 @@ void check_voxels(const BuildJob& job) {
         ", because " + option_text("cutouts", "skip") + " leaves out surfaces that alpha hides";
   const std::string& scene = geometry.scenes.front();
   if (!job.spec.run.allow_empty)
-    throw Error(ErrorCode::kInvalidInput, scene + ": " + message + "; " +
-                                              option_text("allow_empty") +
-                                              " writes a file without voxels");
+    throw UnbuildableJob(ErrorCode::kInvalidInput, scene + ": " + message + "; " +
+                                                       option_text("allow_empty") +
+                                                       " writes a file without voxels");
   job.context.progress.warn_of_input(
       {"no-voxels", scene, message + "; the file will have no nodes"});
 }

@@ -55,12 +55,12 @@ void publish(BuildJob& job, GlobalFileWriter& out, AttributeSections& attributes
   progress.advance(1);
   progress.end_stage();
   job.clock.finish("write");
-  const std::string report_file = report_path(job.spec.run);
+  const std::string report_file = report_path(job.spec.run), text = report_text();
   if (report_file.empty())
     job.store
         ->move_to_disk();  // a later run recognizes the output only by the digest recorded here
   else
-    write_partial_file(files, report_file, report_text());
+    write_partial_file(files, report_file, text);
   rename_results(files, out, report_file);
 }
 

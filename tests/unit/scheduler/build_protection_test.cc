@@ -70,6 +70,39 @@ TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
   }
 }
 
+// While a build waits for the lock of its output, the other build can write the output. Then the
+// waiting build treats it like an output that existed when it started: it replaces a result of the
+// same scene, and keeps a result of another scene.
+TEST_F(BuildProtection, AnOutputWrittenDuringTheWaitIsCheckedAgain) {
+  const std::string other_scene = folder_.file("other.glb");
+  write_spheres(other_scene, 5000);
+  for (const bool is_same : {true, false}) {
+    SCOPED_TRACE(is_same);
+    BuildSpec other = spheres_build(is_same ? scene() : other_scene, folder_.file("first.vdag"));
+    const std::string sha256 = run_build(other, context()).sha256;
+    std::filesystem::remove(output());
+    std::filesystem::remove(output() + ".report.json");
+    auto held = system_files().try_lock(OutputLock::path_of(output()));
+    ASSERT_TRUE(held);
+    warnings_.on_warning = [&] {
+      for (const char* suffix : {"", ".report.json"})
+        std::filesystem::copy_file(other.run.output + suffix, output() + suffix);
+      held.reset();
+    };
+    if (is_same) {
+      EXPECT_EQ(run_build(spec(), context()).sha256, sha256);
+    } else {
+      const Error error = error_of([&] { run_build(spec(), context()); });
+      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+      EXPECT_NE(error.message().find("is the result of another scene"), std::string::npos)
+          << error.message();
+      EXPECT_EQ(std::filesystem::file_size(output()), std::filesystem::file_size(other.run.output));
+    }
+    warnings_.on_warning = nullptr;
+    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
+  }
+}
+
 // If a lock is not released in time, the build fails with kIo, a transient error, so that the
 // service tries the job again.
 TEST_F(BuildProtection, ALockThatStaysIsATransientError) {
