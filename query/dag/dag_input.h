@@ -24,7 +24,12 @@ class DagInput {
  public:
   // `file` must outlive this object. `memory_bytes` is the limit of the process's resident memory.
   DagInput(const voxdag_reader::File& file, uint64_t memory_bytes, const CancelToken& cancel)
-      : file_(file), memory_bytes_(memory_bytes), cancel_(cancel), blocks_(file) {}
+      : file_(file),
+        memory_bytes_(memory_bytes),
+        bytes_between_checks_(
+            std::clamp(memory_bytes / 16, kMinBytesBetweenChecks, kMaxBytesBetweenChecks)),
+        cancel_(cancel),
+        blocks_(file) {}
 
   const voxdag_reader::File& file() const { return file_; }
   const voxdag_reader::Level& level(uint32_t level) const { return file_.level(level); }
@@ -57,7 +62,9 @@ class DagInput {
   friend class LevelCursor;
   // An upper estimate of the bytes that the system loads into memory for one access to the mapping.
   static constexpr uint64_t kVisitBytes = uint64_t{64} << 10;
-  static constexpr uint64_t kBytesBetweenChecks = uint64_t{8} << 20;
+  // A check of the resident memory takes as long as tens of accesses.
+  static constexpr uint64_t kMinBytesBetweenChecks = uint64_t{8} << 20;
+  static constexpr uint64_t kMaxBytesBetweenChecks = uint64_t{256} << 20;
 
   void expect_intact(uint32_t level, uint64_t offset) {
     const voxdag_reader::Level& nodes = file_.level(level);
@@ -69,12 +76,13 @@ class DagInput {
   }
   void touch(uint64_t bytes) {
     touched_bytes_ += bytes;
-    if (touched_bytes_ > kBytesBetweenChecks) check();
+    if (touched_bytes_ > bytes_between_checks_) check();
   }
   void check();
 
   const voxdag_reader::File& file_;
   const uint64_t memory_bytes_;
+  const uint64_t bytes_between_checks_;
   const CancelToken& cancel_;
   const CheckedBlocks blocks_;
   uint64_t touched_bytes_ = 0;  // bytes read since the last check of the memory

@@ -132,8 +132,10 @@ class ChunkWriter {
     write_manifest(std::move(list));
     return report_;
   }
-  void remove_files() {
+  // Removes the files and the folders that this export has created.
+  void undo() {
     for (const std::string& path : written_) files_.remove(path);
+    for (; !folders_.empty(); folders_.pop_back()) files_.remove_directory(folders_.back());
   }
 
  private:
@@ -148,7 +150,8 @@ class ChunkWriter {
     const std::string name = folder + "/" + std::to_string(x) + "_" + std::to_string(y) + "_" +
                              std::to_string(z) +
                              (format.suffix ? format.suffix : std::string(".") + format.name);
-    files_.make_directories(request_.request.output + "/" + folder);
+    make_folder(request_.request.output);
+    make_folder(request_.request.output + "/" + folder);
     NoProgress progress;
     const ExportReport report =
         dag_.write(files_, chunk.selection, request_.request.output + "/" + name, progress, cancel);
@@ -170,6 +173,11 @@ class ChunkWriter {
             {"voxels", report.voxels},
             {"files", std::move(list)}};
   }
+  void make_folder(const std::string& path) {
+    if (files_.exists(path)) return;
+    files_.make_directories(path);
+    folders_.push_back(path);
+  }
   std::array<double, 6> world_box(const Selection& selection) const {
     std::array<double, 6> box{};
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -188,7 +196,7 @@ class ChunkWriter {
                            {"chunk_voxels", request_.edge},
                            {"levels", std::move(levels)}};
     report_.manifest = request_.request.output + "/manifest.json";
-    files_.make_directories(request_.request.output);
+    make_folder(request_.request.output);
     write_file_atomically(files_, report_.manifest, json_text(manifest, 1) + "\n");
   }
 
@@ -197,7 +205,7 @@ class ChunkWriter {
   const ChunksRequest& request_;
   DagExport dag_;
   ChunksReport report_;
-  std::vector<std::string> written_;
+  std::vector<std::string> written_, folders_;  // created files and folders
 };
 
 }  // namespace
@@ -212,7 +220,7 @@ ChunksReport export_chunks(FileSystem& files, const voxdag_reader::File& file,
   try {
     return writer.run(progress, cancel);
   } catch (...) {
-    writer.remove_files();
+    writer.undo();
     throw;
   }
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -32,8 +33,7 @@ class ExportChunks : public testing::Test {
     ChunksRequest request{{&export_format("npz"), {6, region}, folder(), 64 << 20}, edge, levels};
     request.request.options.compact = true;
     request.request.replace = replace_;
-    NoProgress progress;
-    return export_chunks(system_files(), *file_, request, progress, CancelToken{});
+    return export_chunks(system_files(), *file_, request, progress_, cancel_);
   }
   nlohmann::json manifest() const {
     return nlohmann::json::parse(read_bytes(folder() + "/manifest.json"));
@@ -55,7 +55,21 @@ class ExportChunks : public testing::Test {
   oracle::Voxels voxels_;
   const QueryFile scene_;
   const std::unique_ptr<voxdag_reader::File> file_;
+  // Cancels the export when its first chunk is complete, if `is_impatient` is set.
+  struct ChunkProgress : NoProgress {
+    void begin_stage(std::string_view name, uint64_t, std::string_view) override {
+      is_export = name == "export";
+    }
+    void advance(uint64_t) override {
+      if (is_export && is_impatient) cancel->cancel();
+    }
+    CancelToken* cancel = nullptr;
+    bool is_export = false, is_impatient = false;
+  };
+
   TemporaryFolder folder_;
+  CancelToken cancel_;
+  ChunkProgress progress_;
   bool replace_ = false;
 };
 
@@ -108,6 +122,17 @@ TEST_F(ExportChunks, AFolderWithFilesIsRefused) {
   EXPECT_NO_THROW(exported(32, 1));
   for (const auto& [edge, levels] : {std::pair{48, 1}, std::pair{2, 1}, std::pair{16, 6}})
     EXPECT_THROW(exported(static_cast<uint64_t>(edge), static_cast<uint64_t>(levels)), Error);
+}
+
+// A canceled export removes the folders that it has created, and no others.
+TEST_F(ExportChunks, ACanceledExportLeavesNoFolders) {
+  progress_.cancel = &cancel_;
+  progress_.is_impatient = true;
+  EXPECT_THROW(exported(16, 2), Error);
+  EXPECT_FALSE(std::filesystem::exists(folder()));
+  std::filesystem::create_directories(folder());
+  EXPECT_THROW(exported(16, 2), Error);
+  EXPECT_TRUE(std::filesystem::is_empty(folder()));
 }
 
 // An export of a region without voxels succeeds, and writes no chunks.
