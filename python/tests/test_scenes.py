@@ -79,6 +79,11 @@ def test_meshes_files_and_arrays_are_one_scene(mesh, tmp_path):
     lines += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh[1][:half].tolist())
     (tmp_path / "half.obj").write_text(lines)
     assert digest([tmp_path / "half.obj", parts[1]], tmp_path) == digest(mesh, tmp_path)
+    tuples = [(mesh[0], mesh[1][:half]), (mesh[0], mesh[1][half:])]
+    assert digest(tuples, tmp_path) == digest(mesh, tmp_path)
+    assert digest([tuples[0], parts[1]], tmp_path) == digest(mesh, tmp_path)
+    # A mesh without triangles adds nothing, unlike a mesh whose triangles are None (points).
+    assert digest([mesh, (mesh[0] + 0.001, mesh[1][:0])], tmp_path) == digest(mesh, tmp_path)
 
 
 def test_open_files(mesh, tmp_path):
@@ -165,6 +170,8 @@ def test_open3d_triangle_meshes(colors_of):
             r"vertices\[1\] is not finite.*triangles\[0\]",
         ),
         (([[np.inf, 0, 0]], np.empty((0, 3), int)), r"vertices\[0\] is not finite"),
+        (([[0, 0, 0]], np.empty((0, 3), int)), "mesh in memory: has no triangles"),
+        (SimpleNamespace(vertices=VERTICES, faces=TRIANGLES[:0]), "has no triangles"),
         (voxdag.Mesh([[0, 0, 0]], [[0, 0, 1]], name="a"), r"mesh 'a': triangles\[0\] is"),
         (voxdag.Mesh([[0, 0, 0]], [[0, 0, 0]], colors=[[2.0, 0, 0]]), r"colors\[0\] is \[2.0"),
         (voxdag.Mesh([[0, 0, 0]], [[0, 0, 0]], colors=[[1, 2]]), r"colors is an array \(1, 2\)"),

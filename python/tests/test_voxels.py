@@ -57,6 +57,20 @@ def test_points():
     assert white_and_black.colors([[0, 0, 0]]).tolist() == [[188] * 3]  # the mean in linear light
 
 
+def test_grids_far_from_zero():
+    """Voxels far from 0 are right or refused, and never lost."""
+    voxels = np.argwhere(np.ones((4, 2, 3)))
+    near, far = (1.5e14, -1e14, 0), (0, 0, -3e14)
+    assert voxdag.from_voxels(voxels, origin=near).voxels == len(voxels)
+    for build in (voxdag.from_voxels, voxdag.from_points):
+        with pytest.raises(voxdag.Error, match="cannot distinguish the voxels there"):
+            build(
+                voxels + (0 if build is voxdag.from_voxels else np.array(far)),
+                voxel_size=1,
+                origin=far,
+            )
+
+
 def test_nothing():
     for dag in (
         voxdag.from_dense(np.zeros((4, 4, 4))),

@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from typing import IO, TYPE_CHECKING, Any, Callable, SupportsIndex, Union
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _native
@@ -27,12 +28,14 @@ if TYPE_CHECKING:
     from ._reports import BuildReport
     from ._types import Estimate
 
-_Item = Union[Path, IO[bytes], SceneObject]
+_Item = Union[Path, IO[bytes], SceneObject, tuple[ArrayLike, ArrayLike]]
 # A scene of build() and plan(): a path, an open binary file, a mesh, or a sequence of these, which
 # together form one scene. A mesh is a Mesh, an object of trimesh, Open3D, PyVista or meshio, or a
-# tuple (vertices, triangles) of arrays. build() describes these forms. A sequence cannot contain
-# such a tuple, but it can contain a Mesh with the same arrays.
-Scene = Union[_Item, tuple[ArrayLike, ArrayLike], Sequence[_Item]]
+# tuple (vertices, triangles) of arrays. build() describes these forms.
+Scene = Union[_Item, Sequence[_Item]]
+
+# A scene file without triangles, in the format STL.
+_NO_TRIANGLES = b"solid\nendsolid\n"
 
 
 @lists_options(BuildOptions)
@@ -66,8 +69,7 @@ def build(
     PointCloud), PyVista (PolyData or a grid) or meshio (Mesh); or a tuple (vertices, triangles).
     In the tuple, `vertices` is an array (N, 3) of numbers; float64 is not rounded to float32.
     `triangles` is an array (M, 3) of integers: for each triangle, the indexes of its three
-    vertices. A list cannot contain such a tuple, but it can contain a Mesh with the same arrays.
-    Do not change the arrays before build() returns.
+    vertices. Do not change the arrays before build() returns.
 
     The report is a dict with the same members as the JSON object that `voxdag build --json` prints.
     Raises Error if an argument is invalid or the build fails. Further options:
@@ -142,7 +144,13 @@ def native_scene(
     replace LAZ files until the end of the context."""
     files, streams, meshes = _parts_of(scene)
     contents = [(f"file in memory {i}", _bytes_of(stream)) for i, stream in enumerate(streams)]
-    arrays = native_meshes(meshes, with_colors, skip_invalid)
+    arrays = []
+    for mesh, native in zip(meshes, native_meshes(meshes, with_colors, skip_invalid)):
+        # The native module takes the vertices of a mesh without triangles as points.
+        if mesh.triangles is not None and len(mesh.triangles) == 0:
+            contents.append((native[0], _NO_TRIANGLES))
+        else:
+            arrays.append(native)
     return _with_las(files, las_prefix, contents, arrays)
 
 
@@ -168,7 +176,7 @@ def _edge_of(resolution: SupportsIndex | None, options: BuildOptions) -> int:
 
 def _parts_of(scene: Any) -> tuple[list[str], list[IO[bytes]], list[Mesh]]:
     """Returns three lists: the paths, the open files and the meshes of a scene."""
-    if _is_pair_of_arrays(scene):
+    if _is_pair_of_arrays(scene) and not all(_is_mesh_tuple(item) for item in scene):
         return [], [], [Mesh(*scene)]
     paths: list[str] = []
     streams: list[IO[bytes]] = []
@@ -176,6 +184,8 @@ def _parts_of(scene: Any) -> tuple[list[str], list[IO[bytes]], list[Mesh]]:
     for item in [scene] if _is_part(scene) else _items_of(scene):
         if is_mesh(item):
             meshes += meshes_of(item)
+        elif _is_mesh_tuple(item):
+            meshes.append(Mesh(*item))
         elif hasattr(item, "read"):
             streams.append(item)
         else:
@@ -205,6 +215,11 @@ def _bytes_of(stream: IO[bytes]) -> bytes:
 def _is_part(scene: Any) -> bool:
     """True for a path, an open file or a mesh."""
     return isinstance(scene, (str, bytes, os.PathLike)) or hasattr(scene, "read") or is_mesh(scene)
+
+
+def _is_mesh_tuple(item: Any) -> bool:
+    """True for a tuple (vertices, triangles) in a list of meshes."""
+    return isinstance(item, tuple) and _is_pair_of_arrays(item) and np.ndim(item[0]) == 2
 
 
 def _is_pair_of_arrays(scene: Any) -> bool:

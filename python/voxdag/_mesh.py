@@ -36,8 +36,8 @@ class Mesh:
     vertices      array (N, 3) of numbers: the positions of the vertices. float64 is not rounded to
                   float32.
     triangles     array (M, 3) of integers: for each triangle, the indexes of its three vertices. If
-                  it is None or has no rows, the vertices are points. Each point sets one voxel,
-                  unless the option `point_radius` is given.
+                  it is None, the vertices are points. Each point sets one voxel, unless the option
+                  `point_radius` is given.
     colors        array (N, 3) or (N, 4): red, green, blue and optionally alpha of each vertex, as
                   integers from 0 to 255 or floats from 0 to 1. Colors are in sRGB; alpha is linear.
     face_colors   array (M, 3) or (M, 4): the color of each triangle, in the same form. A mesh

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _MIN_RESOLUTION, _MAX_RESOLUTION = 4, 1 << 20
+# Up to this distance from 0, a double is at most 1/32 of a voxel away from the center of a voxel.
+_MAX_VOXELS_FROM_ZERO = 1 << 48
 
 
 @lists_options(VoxelOptions)
@@ -233,6 +235,14 @@ def _dag_of(
         if name not in VoxelOptions.__annotations__:
             raise TypeError(f"unexpected keyword argument {name!r}")
     resolution = _resolution_of(cells, given_resolution)
+    farthest = max(np.abs(origin).max(), np.abs(origin + voxel_size * resolution).max())
+    if farthest > voxel_size * _MAX_VOXELS_FROM_ZERO:
+        raise Error(
+            f"the grid from {origin.tolist()} reaches the coordinate {farthest:g}: expected at "
+            f"most 2^48 times the voxel size, {voxel_size:g}, because numbers of 64 bits cannot "
+            "distinguish the voxels there",
+            "invalid_input",
+        )
     chosen = cast(BuildOptions, {"allow_empty": True, **options})
     if colors is not None:
         chosen["color"] = True
