@@ -7,8 +7,10 @@ namespace voxdag::server {
 namespace {
 
 constexpr size_t kUploadBufferBytes = 256 << 10;
-// Maximum bytes that a client must send again after a power cut.
+// Maximum bytes that a client must send again after a power cut, and maximum age of these bytes
+// while further bytes arrive.
 constexpr uint64_t kCheckpointBytes = uint64_t{64} << 20;
+constexpr double kCheckpointS = 1;
 
 RequestError wrong_offset(uint64_t first, uint64_t expected) {
   RequestError error(RequestError::Kind::kConflict,
@@ -21,14 +23,16 @@ RequestError wrong_offset(uint64_t first, uint64_t expected) {
 }  // namespace
 
 SceneUpload::SceneUpload(SceneStore& store, std::string name, uint64_t first,
-                         std::optional<uint64_t> total)
+                         std::optional<uint64_t> total, std::function<double()> clock)
     : store_(store),
       name_(std::move(name)),
       lock_(store, name_),
       first_(first),
+      clock_(std::move(clock)),
       total_(total),
       offset_(first),
-      recorded_(first) {
+      recorded_(first),
+      recorded_s_(clock_()) {
   const std::string path = store_.part_path(name_);
   if (first_ == 0) {
     store_.record(name_, {0, total_});
@@ -73,7 +77,8 @@ bool SceneUpload::has_part() const {
 void SceneUpload::write(std::string_view bytes) {
   buffer_ += bytes;
   if (buffer_.size() >= kUploadBufferBytes) flush();
-  if (offset_ - recorded_ >= kCheckpointBytes) checkpoint();
+  if (offset_ - recorded_ >= kCheckpointBytes || clock_() - recorded_s_ >= kCheckpointS)
+    checkpoint();
 }
 
 void SceneUpload::flush() {
@@ -90,6 +95,7 @@ void SceneUpload::checkpoint() {
   file_->sync();
   store_.record(name_, {offset_, total_});
   recorded_ = offset_;
+  recorded_s_ = clock_();
 }
 
 bool SceneUpload::finish(const std::string& part_digest, const std::string& whole_digest,

@@ -1,7 +1,8 @@
-// Writes one request's part of an upload to the store as the bytes arrive. If the request breaks
-// off, the received bytes are recorded, and the client can continue after them. Bytes whose digest
-// was wrong are not recorded. If no byte of an upload was received, its record and its file are
-// removed. Used by one thread.
+// Writes one request's part of an upload to the store as the bytes arrive. Records the received
+// bytes at least every 64 MiB, and with the first bytes that arrive a second or more after the last
+// record. If the request breaks off, all received bytes are recorded, and the client can continue
+// after them. Bytes whose digest was wrong are not recorded. If no byte of an upload was received,
+// its record and its file are removed. Used by one thread.
 #pragma once
 
 #include <functional>
@@ -10,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/clock.h"
 #include "core/format/checksum.h"
 #include "server/scenes/scene_store.h"
 
@@ -20,8 +22,10 @@ class SceneUpload {
   // `first`: offset of this part (0 starts over). `total`: size of the complete upload, if known.
   // Throws RequestError{kConflict} if another request is writing to the scene. Also throws it, with
   // the member upload_offset, if the part does not begin where the previous part ended. Throws
-  // RequestError{kInvalid} if the total differs from the first part's total.
-  SceneUpload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total);
+  // RequestError{kInvalid} if the total differs from the first part's total. `clock` returns
+  // seconds and never goes back.
+  SceneUpload(SceneStore& store, std::string name, uint64_t first, std::optional<uint64_t> total,
+              std::function<double()> clock = wall_seconds);
   ~SceneUpload();
   SceneUpload(const SceneUpload&) = delete;
 
@@ -54,11 +58,13 @@ class SceneUpload {
   const std::string name_;
   const SceneStore::NameLock lock_;
   const uint64_t first_;
+  const std::function<double()> clock_;
   std::optional<uint64_t> total_;
   std::unique_ptr<WritableFile> file_;
   std::string buffer_;
   uint64_t offset_;
   uint64_t recorded_;  // offset that the store has recorded
+  double recorded_s_;  // time of the last record, or the start of this part
   Sha256 digest_;      // digest of this part
   std::string sha256_;
   bool done_ = false;

@@ -128,7 +128,7 @@ TEST_F(InterruptedUpload, IsNotBlockedBySlowOnes) {
   std::vector<int> sockets;
   for (const char* name : {"a.glb", "b.glb", "c.glb"}) {
     sockets.push_back(begin_upload(name, 80 * kMiB, std::string(300'000, 'x')));
-    ASSERT_TRUE(until([&] { return offset(name) == "0"; }));
+    ASSERT_TRUE(until([&] { return !offset(name).empty(); }));
   }
   EXPECT_EQ(answer_to_upload("d.glb", 101 * kMiB), "HTTP/1.1 507");
   ASSERT_EQ(put_scene("m.glb", scene_bytes()).status, 201);

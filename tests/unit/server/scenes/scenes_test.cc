@@ -112,6 +112,42 @@ TEST_F(Scenes, ContinueWhereTheyBrokeOff) {
   EXPECT_EQ(upload.publish(), sha256_hex("0123456789"));
 }
 
+// After a crash, or while the connection hangs, the client sends at most the bytes of the last
+// second again.
+TEST_F(Scenes, AreRecordedEverySecond) {
+  const auto offset = [&] { return store_->upload("a.glb")->offset; };
+  double now = 0;
+  SceneUpload upload(*store_, "a.glb", 0, 20, [&] { return now; });
+  upload.write("0123");
+  now = 0.9;
+  upload.write("45");
+  EXPECT_EQ(offset(), 0u);
+  now = 1;
+  upload.write("67");
+  EXPECT_EQ(offset(), 8u);
+  EXPECT_EQ(read_small_file(system_files(), folder_.file("parts/a.glb"), 100), "01234567");
+  now = 1.9;
+  upload.write("8");
+  EXPECT_EQ(offset(), 8u);
+  now = 2;
+  upload.write("9");
+  EXPECT_EQ(offset(), 10u);
+}
+
+// A wrong digest also discards the bytes of the part that are already recorded.
+TEST_F(Scenes, DropRecordedBytesOfTheWrongDigest) {
+  const auto send = [&](uint64_t first, const char* bytes, const char* digest) {
+    double now = 0;
+    SceneUpload upload(*store_, "a.glb", first, 10, [&] { return now += 2; });
+    upload.write(bytes);
+    EXPECT_EQ(store_->upload("a.glb")->offset, first + 5);
+    return refusal([&] { upload.finish(sha256_hex(digest), "", false); });
+  };
+  EXPECT_FALSE(send(0, "01234", "01234"));
+  EXPECT_TRUE(send(5, "x6789", "56789"));
+  EXPECT_EQ(store_->upload("a.glb")->offset, 5u);
+}
+
 TEST_F(Scenes, DropAPartOfTheWrongDigest) {
   {
     SceneUpload upload(*store_, "a.glb", 0, 10);
