@@ -132,4 +132,9 @@ void CoarseCubes::refresh(FileSystem& files, const std::string& work_folder, dou
   cubes_ = std::move(cubes);
 }
 
+void CoarseCubes::show_plan(uint64_t total) {
+  *this = {};
+  total_ = total;
+}
+
 }  // namespace voxdag

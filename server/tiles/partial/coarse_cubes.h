@@ -30,6 +30,10 @@ class CoarseCubes {
   // calls. Throws Error{kNotFound} if the folder has no job store, and the errors of JobStore.
   void refresh(FileSystem& files, const std::string& work_folder, double max_read_s = HUGE_VAL);
 
+  // Forgets all built subvolumes of a build with `total` planned subvolumes that has not recorded
+  // its progress yet.
+  void show_plan(uint64_t total);
+
   uint64_t total() const { return total_; }
   // Number of built subvolumes, including empty subvolumes and subvolumes with unreadable
   // artifacts.

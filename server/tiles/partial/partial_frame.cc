@@ -36,7 +36,32 @@ std::vector<PartialDag::Part> planned_parts(const nlohmann::json& plan, const st
   return parts;
 }
 
+// Returns read(plan) for the list of planned subvolumes that the job's process has written.
+template <class Read>
+auto with_plan(FileSystem& files, const JobFolder& folder, const Read& read) {
+  if (!files.exists(folder.subvolumes()))
+    throw Error(ErrorCode::kNotFound,
+                "the subvolumes are not planned yet: expected a job that has read its scene");
+  try {
+    return read(
+        parse_json<nlohmann::json>(read_own_file(files, folder.subvolumes(), kMaxPlanBytes)));
+  } catch (const nlohmann::json::exception&) {
+    throw Error(
+        ErrorCode::kCorrupt,
+        folder.subvolumes() + " is damaged: expected the JSON that the job's process writes");
+  }
+}
+
 }  // namespace
+
+bool is_planned(FileSystem& files, const JobFolder& folder) {
+  return files.exists(folder.work()) && files.exists(folder.subvolumes());
+}
+
+uint64_t read_planned_total(FileSystem& files, const JobFolder& folder) {
+  return with_plan(files, folder,
+                   [](const nlohmann::json& plan) { return plan.at("total").get<uint64_t>(); });
+}
 
 std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution) {
   const uint32_t levels = levels_of_resolution(resolution);
@@ -56,13 +81,8 @@ std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution) {
 }
 
 nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, uint64_t resolution) {
-  if (!files.exists(folder.subvolumes()))
-    throw Error(ErrorCode::kNotFound,
-                "the subvolumes are not planned yet: expected a job that has read its scene");
   const uint32_t levels = levels_of_resolution(resolution);
-  try {
-    const auto plan =
-        parse_json<nlohmann::json>(read_own_file(files, folder.subvolumes(), kMaxPlanBytes));
+  return with_plan(files, folder, [&](const nlohmann::json& plan) {
     const GridPlace place{plan.at("origin"), plan.at("edge")};
     nlohmann::ordered_json frame = {{"origin", place.origin}, {"edge", place.edge}};
     PartialDag nodes(levels);
@@ -77,11 +97,7 @@ nlohmann::ordered_json read_frame(FileSystem& files, const JobFolder& folder, ui
       frame["tall_views"]["iso"] = camera_of("iso", views, planned.view(), place, kTallAspect);
     }
     return frame;
-  } catch (const nlohmann::json::exception&) {
-    throw Error(
-        ErrorCode::kCorrupt,
-        folder.subvolumes() + " is damaged: expected the JSON that the job's process writes");
-  }
+  });
 }
 
 }  // namespace voxdag::server

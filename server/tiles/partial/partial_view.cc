@@ -37,6 +37,16 @@ class PartialTileSource : public TileSource {
   std::string manifest_;
 };
 
+// True if the work folder has a job store. A store without bytes is being created.
+bool has_job_store(FileSystem& files, const JobFolder& folder) {
+  const std::string path = WorkFolder::store_path(folder.work());
+  try {
+    return files.exists(path) && files.open_own(path)->size() > 0;
+  } catch (const Error&) {
+    return false;  // the file was removed after exists() had found it
+  }
+}
+
 }  // namespace
 
 ReadLimiter::Charge::Charge(ReadLimiter& limiter)
@@ -115,16 +125,16 @@ Answer PartialView::read(const JobFolder& folder, Answer (PublishedAnswers::*ans
     if (auto last = (answers_.*answer)()) return last;
     reading.lock();
   }
-  refresh(folder.work());
+  refresh(folder);
   update();
   return (answers_.*answer)();
 }
 
-void PartialView::refresh(const std::string& work_folder) {
+void PartialView::refresh(const JobFolder& folder) {
   if (!limiter_.may_read()) {
     if (has_failed_)
       throw Error(ErrorCode::kInvalidInput,
-                  work_folder +
+                  folder.work() +
                       ": reading the finished subvolumes has just failed, and the service waits "
                       "before it tries again: expected a later request");
     return;
@@ -132,22 +142,29 @@ void PartialView::refresh(const std::string& work_folder) {
   const ReadLimiter::Charge charge(limiter_);
   limiter_.note_read();
   has_failed_ = true;
-  try {
-    cubes_.refresh(files_, work_folder, kMaxReadingS);
-    if (cubes_.total() == 0)
-      throw Error(
-          ErrorCode::kNotFound,
-          work_folder +
-              ": the subvolumes are not planned yet: expected a job that has read its scene");
-  } catch (const Error& error) {
-    // The job's process may have removed the folder while it was being read.
-    if (error.code() != ErrorCode::kNotFound && files_.exists(WorkFolder::store_path(work_folder)))
-      throw;
-    restart();
-    throw Error(ErrorCode::kNotFound, error.message());
-  }
+  read_cubes(folder);
   has_failed_ = is_worthless_ = false;
   ++version_;
+}
+
+void PartialView::read_cubes(const JobFolder& folder) {
+  try {
+    cubes_.refresh(files_, folder.work(), kMaxReadingS);
+    if (cubes_.total() > 0) return;
+    throw Error(ErrorCode::kNotFound,
+                folder.work() +
+                    ": the subvolumes are not planned yet: expected a job that has read its scene");
+  } catch (const Error& error) {
+    // The job's process may have removed the folder while it was being read.
+    if (error.code() != ErrorCode::kNotFound && has_job_store(files_, folder)) throw;
+    if (!is_planned(files_, folder)) {
+      restart();
+      throw Error(ErrorCode::kNotFound, error.message());
+    }
+  }
+  if (cubes_.built() > 0) restart();
+  cubes_.show_plan(read_planned_total(files_, folder));
+  frame_ = nullptr;  // a restarted job may still have the list of an earlier run
 }
 
 // Forgets everything that was read, because the job's folder was removed. If the folder is created

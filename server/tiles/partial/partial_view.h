@@ -108,7 +108,7 @@ class PartialView {
   std::shared_ptr<const TileSource> known(const std::string& digest) const {
     return answers_.known(digest);
   }
-  // True if the last read found no job folder or no plan, and tiles() has never succeeded.
+  // True if the last read found no work folder or no plan, and tiles() has never succeeded.
   // PartialViews then forgets this view, because it has nothing to serve.
   bool is_worthless() const { return is_worthless_; }
 
@@ -118,7 +118,8 @@ class PartialView {
   template <class Answer, class Update>
   Answer read(const JobFolder& folder, Answer (PublishedAnswers::*answer)() const,
               const Update& update);
-  void refresh(const std::string& work_folder);
+  void refresh(const JobFolder& folder);
+  void read_cubes(const JobFolder& folder);
   void restart();
   void update_json(uint64_t resolution);
   void update_tiles(const JobFolder& folder, uint64_t resolution);

@@ -6,6 +6,7 @@
 #include "core/base/error.h"
 #include "scheduler/state/work_folder.h"
 #include "server/base/request_error.h"
+#include "server/tiles/partial/partial_frame.h"
 
 namespace voxdag::server {
 namespace {
@@ -77,11 +78,11 @@ std::shared_ptr<PartialView> PartialViews::view_of(const std::string& job,
     const std::lock_guard lock(mutex_);
     if (auto view = find(job)) return view;
   }
-  // Waiting jobs have no folder and need no entry.
-  if (!files_.exists(WorkFolder::store_path(folder.work())))
-    throw Error(
-        ErrorCode::kNotFound,
-        folder.work() + " has no job.db: expected the work folder of a job that has started");
+  // Jobs that wait or read their scene have nothing to show and need no entry.
+  if (!files_.exists(WorkFolder::store_path(folder.work())) && !is_planned(files_, folder))
+    throw Error(ErrorCode::kNotFound,
+                folder.work() +
+                    ": the subvolumes are not planned yet: expected a job that has read its scene");
   const std::lock_guard lock(mutex_);
   if (auto view = find(job)) return view;
   if (entries_.size() == max_jobs_) {

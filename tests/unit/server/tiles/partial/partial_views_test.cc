@@ -211,6 +211,32 @@ TEST_F(PartialViewsTest, BeginAgainWithAnotherScene) {
   EXPECT_EQ(now["origin"], nlohmann::json::parse(list)["origin"]);
 }
 
+// A build keeps its job store in memory for its first seconds. Until the store has bytes, the view
+// has the planned subvolumes, none of which is built.
+TEST_F(PartialViewsTest, AreEmptyUntilTheBuildRecordsItsProgress) {
+  write_spheres(scene_, 3000);
+  const std::string list = build(10);
+  const std::string away = folder_.file("away.db"), store = WorkFolder::store_path(job_.work());
+  std::filesystem::rename(store, away);
+  EXPECT_EQ(failure(), ErrorCode::kNotFound) << "no plan";
+  write(job_.subvolumes(), list);
+  PartialViews views(system_files(), 1);
+  const auto plan = nlohmann::json::parse(list);
+  const auto cubes = nlohmann::json::parse(views.json("job", job_, kResolution));
+  EXPECT_EQ(cubes["built"], 0);
+  EXPECT_EQ(cubes["total"], plan["total"]);
+  EXPECT_TRUE(cubes["cubes"].empty());
+  const auto empty = nlohmann::json::parse(look(views)->manifest({}));
+  EXPECT_TRUE(empty["root"].is_null());
+  EXPECT_EQ(empty["edge"], plan["edge"]);
+  write(store, "");
+  EXPECT_EQ(nlohmann::json::parse(PartialViews(system_files(), 1).json("job", job_, kResolution)),
+            cubes);
+  std::filesystem::rename(away, store);
+  const auto some = look_until(views, [](const auto& now) { return now["root"].is_object(); });
+  EXPECT_EQ(some->digest(), empty["digest"]);
+}
+
 TEST_F(PartialViewsTest, HaveAnotherDigestWhenMostNodesHaveNoRoot) {
   write_spheres(scene_, 3000);
   write(job_.subvolumes(), build(1));
