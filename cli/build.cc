@@ -87,9 +87,9 @@ void run(const BuildCommand& command, CommandContext& context) {
   auto reports = nlohmann::ordered_json::array();
   for (const BuildSpec& one : builds) {
     const BuildReport report = build(one, command.quiet, context);
-    if (!command.json)
-      print(report);
-    else if (builds.size() == 1)
+    if (!command.json && !command.quiet) print(report);
+    if (!command.json) continue;
+    if (builds.size() == 1)
       print_json_text(report_json(report));
     else
       reports.push_back(parse_json<nlohmann::ordered_json>(report_json(report)));

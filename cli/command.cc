@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <map>
@@ -15,6 +16,7 @@
 #include <utility>
 
 #include "cli/syntax/closest_word.h"
+#include "core/base/options/option_text.h"
 #include "core/fields/field.h"
 
 namespace voxdag::cli {
@@ -81,6 +83,31 @@ void read_config_file(const std::string& path, CLI::App& command) {
     option->multi_option_policy(CLI::MultiOptionPolicy::TakeLast)->add_result(item.inputs);
   }
 }
+
+const CLI::App* g_running_command = nullptr;
+
+bool has_option(const CLI::App& command, const std::string& option) {
+  return command.get_option_no_throw(option) != nullptr;
+}
+
+// Spells an option for the users of the running command. Options of only `voxdag build` are marked:
+// commands such as `edit` and `status` share code with `build`, and its messages recommend options.
+// Hidden commands run on behalf of `build`.
+std::string spell_for_running_command(std::string_view name, std::string_view value) {
+  const CLI::App& command = *g_running_command;
+  const std::string option = spell_for_command_line(name, {});
+  const std::string text = spell_for_command_line(name, value);
+  if (command.get_group().empty() || has_option(command, option)) return text;
+  if (name == "allow_empty") return "";  // no other command refuses an empty result
+  const auto is_build = [](const CLI::App* other) { return other->get_name() == "build"; };
+  const CLI::App& all = *command.get_parent();
+  for (const CLI::App* build : all.get_subcommands(is_build))
+    if (has_option(*build, option)) return text + " of voxdag build";
+  return text;
+}
+
+constexpr Audience kCommandUsers{&spell_for_running_command, kCommandLineUsers.spell_command,
+                                 kCommandLineUsers.repeat};
 
 constexpr const char* kWholeNumber = "whole number";  // name of the check of such an option
 
@@ -179,6 +206,13 @@ std::string message_of(const CLI::ParseError& error, const std::string& command)
     return option + " is given several times: expected it once";
   if (text.starts_with(option + ": ") && text.ends_with(" missing"))
     return option + " has no value: expected one";
+  constexpr std::string_view kExcludes = " excludes ", kRequires = " requires --";
+  if (const size_t at = text.find(kExcludes); at != text.npos)
+    return text.substr(0, at) + " and " + text.substr(at + kExcludes.size()) +
+           " are both given: expected one of them";
+  if (const size_t at = text.find(kRequires); at != text.npos)
+    return text.substr(0, at) + " is given without " +
+           text.substr(at + kRequires.size() - strlen("--")) + ": expected both";
   constexpr std::string_view kIsRequired = " is required";
   if (!text.starts_with("-") && text.ends_with(kIsRequired))
     return (command.empty() ? "" : command + ": ") + "the argument '" +
@@ -279,12 +313,12 @@ Option Command::output_option(const char* names, std::string& path, const char* 
   return option(names, path, description).check(path_problem);
 }
 
-void Command::json_flag(bool& value, const char* description) {
-  flag("--json", value, description);
+Option Command::json_flag(bool& value, const char* description) {
+  return flag("--json", value, description);
 }
 
-void Command::quiet_flag(bool& value) {
-  flag("-q,--quiet", value, "print no progress, only warnings and errors");
+void Command::quiet_flag(bool& value, const char* description) {
+  flag("-q,--quiet", value, description);
 }
 
 void Command::threads_option(unsigned& value) {
@@ -306,7 +340,13 @@ void Command::config_option() {
 
 bool Command::given(const char* option) const { return app_->count(option) > 0; }
 void Command::hide() { app_->group(""); }
-void Command::on_run(std::function<void()> run) { app_->callback(std::move(run)); }
+void Command::on_run(std::function<void()> run) {
+  app_->callback([app = app_, run = std::move(run)] {
+    g_running_command = app;
+    set_audience(kCommandUsers);
+    run();
+  });
+}
 
 CommandLine::CommandLine(CommandContext& context)
     : context_(context),

@@ -89,10 +89,11 @@ class Command {
   Option flag(const char* names, bool& value, const char* description);
   // Adds an option for the name of a file to write.
   Option output_option(const char* names, std::string& path, const char* description);
-  void json_flag(bool& value,
-                 const char* description = "report as one JSON object on standard output");
-  // Adds --quiet.
-  void quiet_flag(bool& value);
+  Option json_flag(bool& value,
+                   const char* description = "report as one JSON object on standard output");
+  // Adds --quiet. A command whose output is its result passes another description and still prints
+  // this output.
+  void quiet_flag(bool& value, const char* description = "print only warnings and errors");
   // Adds --threads, 1 to 1024.
   void threads_option(unsigned& value);
   // Adds the option --memory, whose value is the text of a size.

@@ -107,7 +107,7 @@ void declare(Command& command, DiffCommand& state) {
                  "folder for temporary files if --memory is not sufficient; default: the folder of "
                  "the file A");
   command.threads_option(state.threads);
-  command.quiet_flag(state.quiet);
+  command.quiet_flag(state.quiet, "print only the differences, warnings and errors");
   command.json_flag(state.json);
 }
 

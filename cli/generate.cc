@@ -40,6 +40,7 @@ void run(GenerateCommand& command, CommandContext& context) {
   const GenerateReport report =
       generate_scene(files, command.output.path, command.options, *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
+  if (command.quiet && !command.json) return;
   if (!command.json) return print(command, report, wall_s);
   print_json(nlohmann::ordered_json{{"kind", command.kind},
                                     {"seed", command.options.seed},

@@ -45,6 +45,7 @@ void run(const ImportCommand& command, CommandContext& context) {
   const ImportReport report = import_scene(files, command.input, command.output.path, memory_bytes,
                                            warn, *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
+  if (command.quiet && !command.json) return;
   if (!command.json) return print(command, report, wall_s);
   print_json(nlohmann::ordered_json{{"input", command.input},
                                     {"output", command.output.path},

@@ -287,14 +287,14 @@ void declare(Command& command, InfoCommand& state) {
       "neighbors of a voxel that --components connects with it: 6 (common face), or 26 (also "
       "common edge or corner; default)");
   connectivity.needs(components);
-  const Option csv = command.flag("--csv", state.csv, "print a table as CSV, one line per file");
+  Option csv = command.flag("--csv", state.csv, "print a table as CSV, one line per file");
   Option levels = command.flag("--levels", state.levels, "one line of CSV per level");
   levels.needs(csv);
   command.option(
       "--memory", state.memory,
       "limit of the memory that --stats and --components allocate (default: half the RAM; "
       "at least 64MiB)");
-  command.json_flag(state.json);
+  csv.excludes(command.json_flag(state.json));
 }
 
 }  // namespace

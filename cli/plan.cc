@@ -83,7 +83,7 @@ void declare(Command& command, PlanCommand& state) {
   options.at("resolution").optional();  // --voxel-size can replace it
   command.config_option();
   declare_cluster(command, state.cluster);
-  command.quiet_flag(state.quiet);
+  command.quiet_flag(state.quiet, "print only the estimate, warnings and errors");
   command.json_flag(state.json);
 }
 

@@ -86,6 +86,7 @@ void report(const RenderCommand& command, const query::Placement& placement,
     });
     return print_json(json);
   }
+  if (command.quiet) return;
   const std::string& name = command.output.path.empty() ? command.depth : command.output.path;
   std::printf("%s: %d x %d, %s\n", printable_line(name).c_str(), command.options.width,
               command.options.height, duration_text(wall_s).c_str());

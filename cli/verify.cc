@@ -170,7 +170,7 @@ void run(const VerifyCommand& command, CommandContext& context) {
   });
   if (command.json)
     print_json(verify_json(command, *file, scratch.bytes_written(), sample));
-  else
+  else if (!command.quiet)
     print(*file, sample);
 }
 

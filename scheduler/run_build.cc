@@ -28,6 +28,7 @@
 #include "scheduler/stages/publish/publish_stage.h"
 #include "scheduler/stages/reorder/reorder_stage.h"
 #include "scheduler/state/full_disk_advice.h"
+#include "scheduler/state/job/empty_scene.h"
 
 namespace voxdag {
 namespace {
@@ -80,15 +81,14 @@ void check_empty(BuildJob& job, uint64_t declared) {
   else if (report.dropped_invalid == declared)
     message = "has only invalid triangles (" + count_text(declared) + ")";
   else if (report.dropped_outside == declared)
-    message = "has " + count_text(declared) + " triangles, all outside the grid";
+    message = "has " + count_text(declared) + " triangles, all outside the grid (" +
+              grid_range_text(report.grid) + ")";
   std::string scenes;
   for (const std::string& scene : job.spec.geometry.scenes)
     scenes += (scenes.empty() ? "" : ", ") + scene;
   if (!job.spec.run.allow_empty) {
     for (const Warning& warning : job.store->warnings()) message += "; " + warning.text();
-    throw Error(ErrorCode::kInvalidInput, scenes + ": " + message + "; " +
-                                              option_text("allow_empty") +
-                                              " writes a file without voxels");
+    throw empty_scene_error(scenes + ": " + message);
   }
   job.context.progress.warn_of_input(
       {"empty-scene", scenes, message + "; the file will have no nodes"});

@@ -71,6 +71,7 @@ void run(const CombineCommand& command, CommandContext& context) {
   const query::CombineReport report =
       query::combine(*a, *b, spec, context.files, *progress, context.cancel);
   const RunTimes times = timer.elapsed();
+  if (command.quiet && !command.json) return;
   if (!command.json) return print_combined(command.output, report, times);
   print_json(combined_json(command.output, report, times));
 }

@@ -61,6 +61,7 @@ void run(const EditCommand& command, CommandContext& context) {
   const RunTimer timer;
   const query::CombineReport report = edit(spec, context.files, *progress, context.cancel);
   const RunTimes times = timer.elapsed();
+  if (command.quiet && !command.json) return;
   if (!command.json) return print_combined(command.output, report, times);
   print_json(combined_json(command.output, report, times));
 }

@@ -44,6 +44,7 @@ void print_chunks(const ExportCommand& command, const query::ChunksReport& repor
                                              {"voxels", report.voxels},
                                              {"peak_rss_bytes", peak_resident_bytes()},
                                              {"wall_s", wall_s}});
+  if (command.quiet) return;
   std::printf("%s: %s chunks, %s, %s voxels, %s\n", printable_line(report.manifest).c_str(),
               count_text(report.chunks).c_str(), size_text(report.bytes).c_str(),
               count_text(report.voxels).c_str(), duration_text(wall_s).c_str());
@@ -71,6 +72,7 @@ void run(const ExportCommand& command, CommandContext& context) {
   const query::ExportReport report =
       query::export_dag(context.files, *file, request, *progress, context.cancel);
   const double wall_s = wall_seconds() - start_s;
+  if (command.quiet && !command.json) return;
   if (!command.json) return print(report, wall_s);
   print_json(nlohmann::ordered_json{{"format", command.format},
                                     {"files", report.files},

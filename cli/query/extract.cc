@@ -78,6 +78,7 @@ void run(const ExtractCommand& command, CommandContext& context) {
   const query::ExtractReport report =
       query::extract(*file, spec, context.files, *progress, context.cancel);
   const RunTimes times = timer.elapsed();
+  if (command.quiet && !command.json) return;
   if (!command.json) return print(command, report, times);
   print_json(extract_json(command, report, *open_global_file(spec.output), times));
 }

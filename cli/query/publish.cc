@@ -108,6 +108,7 @@ void check(const PublishCommand& command, CommandContext& context) {
   for (const query::PackageBand& band : reader.index().bands)
     (band.is_color ? color_pages : tiles) += band.items;
   const size_t packs = reader.index().packs.size();
+  if (command.quiet && !command.json) return;
   if (command.json)
     print_json(nlohmann::ordered_json{{"package", command.check},
                                       {"packs", packs},
@@ -157,6 +158,7 @@ void run(const PublishCommand& command, CommandContext& context) {
   const RunTimer timer;
   const query::PackageReport report = write(command, *file, spec, *progress, context);
   const RunTimes times = timer.elapsed();
+  if (command.quiet && !command.json) return;
   if (!command.json) return print(command, report, times);
   print_json(report_json(command, report, times));
 }

@@ -44,6 +44,7 @@ void run(const ReorderCommand& command, CommandContext& context) {
   const query::ReorderReport report =
       query::reorder(*file, spec, context.files, *progress, context.cancel);
   const RunTimes times = timer.elapsed();
+  if (command.quiet && !command.json) return;
   if (!command.json) return print(command, report, times);
   print_json(nlohmann::ordered_json{{"output", command.output},
                                     {"sha256", report.sha256},

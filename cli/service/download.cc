@@ -58,7 +58,7 @@ void download_export(const DownloadCommand& command, ServiceClient& service, Fil
   for (size_t i = 0; i < remote.size(); ++i) {
     const auto result = client::download_file(service, files, remote[i], paths[i], progress);
     done.push_back(file_json(paths[i], result));
-    if (!command.json) print_file(paths[i], result);
+    if (!command.json && !command.quiet) print_file(paths[i], result);
   }
   if (command.json)
     return print_json(Json{{"export", exported.at("id")},
@@ -66,6 +66,7 @@ void download_export(const DownloadCommand& command, ServiceClient& service, Fil
                            {"files", done},
                            {"voxels", exported.at("voxels")},
                            {"notes", exported.at("notes")}});
+  if (command.quiet) return;
   for (const Json& note : exported.at("notes"))
     std::printf("  %s\n", printable_line(note.get<std::string>()).c_str());
 }
@@ -92,7 +93,7 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
       service, files, service.job(command.id), command.output.path, *progress);
   if (command.json)
     print_json(file_json(command.output.path, result));
-  else
+  else if (!command.quiet)
     print_file(command.output.path, result);
 }
 

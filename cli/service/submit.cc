@@ -67,7 +67,7 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
   if (command.json) print_json(job);
   if (!command.wait) return;
   check_succeeded(job);
-  if (!command.json) print_result(job);
+  if (!command.json && !command.quiet) print_result(job);
 }
 
 void declare(Command& command, SubmitCommand& state) {
@@ -76,7 +76,7 @@ void declare(Command& command, SubmitCommand& state) {
   command.config_option();
   state.service.declare(command);
   command.flag("--wait", state.wait, "follow the job until it ends, as watch does");
-  command.quiet_flag(state.quiet);
+  command.quiet_flag(state.quiet, "print only the job's id and address, warnings and errors");
   command.json_flag(state.json, "the job as one JSON object on standard output");
 }
 

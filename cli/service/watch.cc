@@ -18,7 +18,7 @@ void run(const WatchCommand& command, ServiceClient& service, CommandContext&) {
   const Json job = follow_job(service, command.id, command.quiet);
   if (command.json) print_json(job);
   check_succeeded(job);
-  if (!command.json) print_result(job);
+  if (!command.json && !command.quiet) print_result(job);
 }
 
 void declare(Command& command, WatchCommand& state) {

@@ -219,11 +219,34 @@ TEST_F(BuildCommand, RefusesTheStandardOutput) {
 }
 
 TEST_F(BuildCommand, IsQuiet) {
-  const Answer answer = run({"build", "m.glb", "-r", "64", "-o", "m.vdag", "-q"});
-  EXPECT_EQ(answer.err, "");
-  EXPECT_NE(answer.out, "");
-  EXPECT_EQ(run({"verify", "m.vdag", "--quiet"}).err, "");
+  const auto say = [&](std::vector<std::string> args) {
+    args.push_back("-q");
+    const Answer answer = run(args);
+    EXPECT_EQ(answer.status, 0) << answer.err;
+    EXPECT_EQ(answer.err, "");
+    return answer.out;
+  };
+  const std::vector<std::vector<std::string>> commands = {
+      {"build", "m.glb", "-r", "64", "-o", "m.vdag"},
+      {"build", "m.glb", "-r", "16,32", "-o", "n.vdag"},
+      {"verify", "m.vdag"},
+      {"verify", "m.vdag", "--against", "m.glb"},
+      {"render", "m.vdag", "-o", "m.png", "--size", "8x8"},
+      {"extract", "m.vdag", "--level", "4", "-o", "e.vdag"},
+      {"combine", "m.vdag", "--union", "m.vdag", "-o", "c.vdag"},
+      {"edit", "m.vdag", "--cut", "sphere:9,9,9,9", "-o", "d.vdag"},
+      {"reorder", "m.vdag", "--order", "first-parent", "-o", "r.vdag"},
+      {"export", "m.vdag", "--to", "npz", "-o", "m.npz"},
+      {"export", "m.vdag", "--to", "vox", "--chunks", "32", "-o", "chunks"},
+      {"publish", "m.vdag", "-o", "site", "--no-poster"},
+      {"publish", "--check", "site"},
+      {"generate", "menger", "g.glb", "--level", "1"}};
+  for (const auto& command : commands) EXPECT_EQ(say(command), "") << command[0];
   EXPECT_NE(run({"verify", "m.vdag"}).err, "");
+  // `plan` and `diff` print their result.
+  EXPECT_NE(say({"plan", "m.glb", "-r", "64"}), "");
+  EXPECT_NE(say({"diff", "m.vdag", "m.vdag"}), "");
+  EXPECT_TRUE(run_json({"verify", "m.vdag", "-q"})["ok"]);
 }
 
 // Options are read from the file that --config names. Options on the command line take precedence.
@@ -286,7 +309,7 @@ TEST_F(BuildCommand, RefusesWrongOptions) {
       {{"-r", "64", "--voxel-size", "-1"}, 2, "--voxel-size"},
       {{"-r", "64", "--voxel-size", "inf"}, 2, "--voxel-size"},
       {{"-r", "64", "--voxel-size", "0.01"}, 2, "does not fit"},
-      {{"-r", "64", "--voxel-size", "1", "--bounds", "0,0,0,1"}, 2, "xclude"},
+      {{"-r", "64", "--voxel-size", "1", "--bounds", "0,0,0,1"}, 2, "expected one of"},
       {{"-r", "64", "--backend", "abacus"}, 2, "abacus"},
       {{"-r", "64", "--config", "none.toml"}, 3, "none.toml"},
       {{"-r", "64", "--config", "m.glb"}, 2, "m.glb"},

@@ -104,6 +104,14 @@ TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   const Answer watched = run({"watch", id});
   EXPECT_EQ(watched.status, 0);
   EXPECT_NE(watched.err.find("\nbuild "), std::string::npos) << watched.err;
+  for (const auto& quiet : std::vector<std::vector<std::string>>{
+           {"watch", id, "-q"},
+           {"download", id, "-o", "q.vdag", "-q"},
+           {"download", id, "--to", "npz", "-o", "q.npz", "-q"}}) {
+    const Answer answer = run(quiet);
+    EXPECT_EQ(answer.status, 0) << answer.err;
+    EXPECT_EQ(answer.out + answer.err, "") << quiet[0];
+  }
   EXPECT_NE(watched.out.find(report["sha256"].get<std::string>()), std::string::npos);
 }
 

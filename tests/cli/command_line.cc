@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <regex>
 
 namespace command_line {
 namespace {
@@ -56,6 +58,23 @@ void CommandLine::expect_error(int status, const std::string& part,
   EXPECT_EQ(answer.status, status) << answer.err;
   EXPECT_EQ(answer.out, "");
   EXPECT_NE(answer.err.find(part), std::string::npos) << answer.err;
+  expect_own_options(answer.err, args);
+}
+
+void CommandLine::expect_own_options(const std::string& message,
+                                     const std::vector<std::string>& args) {
+  static std::map<std::string, std::string> helps;  // by command
+  const std::regex named("(voxdag (?:[a-z][a-z-]* )?)?(--[a-z][a-z-]*)( of voxdag [a-z-]+)?");
+  for (std::sregex_iterator found(message.begin(), message.end(), named), end; found != end;
+       ++found) {
+    const std::string option = (*found)[2];
+    const auto is_this = [&](const std::string& arg) { return arg.starts_with(option); };
+    if ((*found)[1].matched || (*found)[3].matched || std::ranges::any_of(args, is_this)) continue;
+    const auto [help, is_new] = helps.emplace(args.empty() ? "" : args[0], "");
+    if (is_new) help->second = run({help->first, "--help"}).out;
+    EXPECT_TRUE(std::regex_search(help->second, std::regex(option + "[^a-z-]")))
+        << "voxdag " << help->first << " does not have " << option << ": " << message;
+  }
 }
 
 void CommandLine::make_scene() {

@@ -31,11 +31,17 @@ class CommandLine : public testing::Test {
   // Runs `voxdag`, expects success, and parses standard output, which must be JSON and nothing
   // else.
   Json run_json(std::vector<std::string> args);
-  // Runs `voxdag`, expects this exit status and a single message that contains `part`.
+  // Runs `voxdag`, expects this exit status and a single message that contains `part`. The message
+  // must recommend only options that the command has.
   void expect_error(int status, const std::string& part, const std::vector<std::string>& args);
 
   // Writes a Menger sponge of 2112 triangles to m.glb.
   void make_scene();
+
+  // Expects that the command has all options that the message names, except for options in `args`.
+  // A message names an option of another command as "voxdag COMMAND --x" or "--x of voxdag
+  // COMMAND".
+  void expect_own_options(const std::string& message, const std::vector<std::string>& args);
 
   bool exists(const std::string& name) const;
   std::string contents(const std::string& name) const;

@@ -217,6 +217,24 @@ TEST_F(Edit, RefusesBadArguments) {
 
 // The output must not be a pasted file, an added scene or a file that an added scene names, also
 // not with --force.
+// `edit` shares the code of `build`, but not all of its options. Messages do not recommend options
+// that only `build` has as if `edit` had them.
+TEST_F(Edit, RecommendsItsOwnOptions) {
+  put("far.obj", "v 9000 0 0\nv 9001 0 0\nv 9000 1 0\nf 1 2 3\n");
+  put("bad.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const auto add = [](const std::string& scene) -> std::vector<std::string> {
+    return {"edit", "a.vdag", "--add", scene, "-o", "x.vdag"};
+  };
+  expect_error(2,
+               "far.obj: has 1 triangles, all outside the grid (from -1024,-1024,-1024 to "
+               "1024,1024,1024): expected a scene that sets voxels in the grid",
+               add("far.obj"));
+  expect_error(2, "--skip-invalid of voxdag build", add("bad.obj"));
+  expect_error(2, "--skip-invalid ", {"build", "bad.obj", "-r", "64", "-o", "x.vdag"});
+  expect_error(2, "; --allow-empty writes a file without voxels",
+               {"build", "far.obj", "-r", "64", "--bounds", "0,0,0,1", "-o", "x.vdag"});
+}
+
 TEST_F(Edit, KeepsItsInputs) {
   const auto expect_kept = [&](const std::string& name, const std::string& option,
                                const std::string& value) {

@@ -340,7 +340,9 @@ TEST_F(FileCommands, InfoCountsTheOctreeAndTheChildren) {
   EXPECT_NE(table.find("\nm.vdag,128," + json["voxels"].dump() + ","), std::string::npos) << table;
   const std::string levels = run({"info", "m.vdag", "--csv", "--levels"}).out;
   EXPECT_EQ(std::count(levels.begin(), levels.end(), '\n'), 1 + json["levels"].size());
-  expect_error(2, "--csv", {"info", "m.vdag", "--levels"});
+  expect_error(2, "--levels is given without --csv: expected both", {"info", "m.vdag", "--levels"});
+  expect_error(2, "--csv and --json are both given: expected one of them",
+               {"info", "m.vdag", "--csv", "--json"});
 }
 
 TEST_F(FileCommands, InfoFindsComponents) {

@@ -8,7 +8,7 @@
 #include "core/base/options/option_text.h"
 #include "merge/merge.h"
 #include "scheduler/solid/full_cubes.h"
-#include "scheduler/spec/unbuildable_job.h"
+#include "scheduler/state/job/empty_scene.h"
 
 namespace voxdag {
 namespace {
@@ -79,10 +79,7 @@ void check_voxels(const BuildJob& job) {
     message +=
         ", because " + option_text("cutouts", "skip") + " leaves out surfaces that alpha hides";
   const std::string& scene = geometry.scenes.front();
-  if (!job.spec.run.allow_empty)
-    throw UnbuildableJob(ErrorCode::kInvalidInput, scene + ": " + message + "; " +
-                                                       option_text("allow_empty") +
-                                                       " writes a file without voxels");
+  if (!job.spec.run.allow_empty) throw empty_scene_error(scene + ": " + message);
   job.context.progress.warn_of_input(
       {"no-voxels", scene, message + "; the file will have no nodes"});
 }
