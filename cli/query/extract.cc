@@ -57,6 +57,7 @@ nlohmann::ordered_json extract_json(const ExtractCommand& command, const query::
   json.update(nlohmann::ordered_json{{"cubes", {{"total", r.parts}, {"split", r.parts_split}}},
                                      {"merge_passes", r.merge_passes},
                                      {"work_bytes", r.work_bytes},
+                                     {"warnings", r.warnings},
                                      {"wall_s", times.wall_s},
                                      {"cpu_s", times.cpu_s},
                                      {"peak_rss_bytes", peak_resident_bytes()}});

@@ -72,7 +72,7 @@ class Extraction {
   ExtractReport run(const std::function<void()>& before_publish) {
     if (spec_.crop && crop_.level == 0 &&
         spec_.selection.region != whole_grid(spec_.selection.grid_levels))
-      progress_.warn(
+      warn(
           "the region has cells on both sides of a plane through the middle of the grid: the "
           "smallest octree cube around it is the complete grid");
     find_majority_cells();
@@ -86,9 +86,9 @@ class Extraction {
     report_.merge_passes = merged.passes;
     report_.work_bytes += merged.scratch_bytes;
     if (merged.voxels == 0)
-      progress_.warn(majority_ ? "no cell of the selection has half of its voxels set: the file "
-                                 "will have no nodes"
-                               : "the selection has no voxels: the file will have no nodes");
+      warn(majority_ ? "no cell of the selection has half of its voxels set: the file "
+                       "will have no nodes"
+                     : "the selection has no voxels: the file will have no nodes");
     else
       with_reader_errors([&] {
         for (const Attribute attribute : attributes_of(file_).list())
@@ -143,6 +143,11 @@ class Extraction {
   std::vector<SelectedPart> build_part(Worker& worker, const SelectedPart& part,
                                        std::vector<ArtifactRef>& built);
   MergeInputs merge_inputs(std::vector<ArtifactRef> artifacts);
+
+  void warn(const char* message) {
+    progress_.warn(message);
+    report_.warnings.emplace_back(message);
+  }
 
   const ExtractSpec& spec_;
   FileSystem& files_;

@@ -52,6 +52,8 @@ struct ExtractReport {
   uint64_t parts_split = 0;  // cubes that did not fit in memory
   uint32_t merge_passes = 0;
   uint64_t work_bytes = 0;  // bytes written to temporary files
+  // Warnings about the result, which `progress` also received.
+  std::vector<std::string> warnings;
 };
 
 // Returns the smallest octree-aligned cube that contains the selection's region, in the selection's

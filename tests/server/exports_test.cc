@@ -133,6 +133,20 @@ TEST_F(ServiceExports, HaveTheBytesOfLocalExports) {
     EXPECT_NE(metrics.find(line), std::string::npos) << line << "is not in\n" << metrics;
 }
 
+// The middle of the scene, a Menger sponge, is empty.
+TEST_F(ServiceExports, HaveTheWarningsOfLocalExtracts) {
+  start();
+  const std::string id = finished_job();
+  const auto extract = [&](const Json& region) {
+    return ended(queued_export(id, {{"to", "vdag"}, {"region", region}}));
+  };
+  const Json empty = extract({30, 30, 30, 34, 34, 34});
+  EXPECT_EQ(empty["voxels"], 0) << empty;
+  EXPECT_EQ(empty["notes"],
+            Json::array({"the selection has no voxels: the file will have no nodes"}));
+  EXPECT_EQ(extract({0, 0, 0, 64, 64, 64})["notes"], Json::array());
+}
+
 TEST_F(ServiceExports, RefuseWrongRequests) {
   config_.exports.max_per_job = 1;
   start();

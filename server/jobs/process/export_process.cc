@@ -26,7 +26,7 @@ ExportResult write_vdag(FileSystem& files, const voxdag_reader::File& file, cons
   extract.memory_bytes = task.memory_bytes;
   extract.threads = task.threads ? task.threads : default_threads();
   const query::ExtractReport report = query::extract(file, extract, files, progress, cancel);
-  return {{{task.output, report.bytes, report.sha256}}, report.voxels, {}};
+  return {{{task.output, report.bytes, report.sha256}}, report.voxels, report.warnings};
 }
 
 ExportResult write_format(FileSystem& files, const voxdag_reader::File& file, const JobTask& task,

@@ -37,7 +37,7 @@ void fields(Visitor& visit, ExportedFile& file) {
 struct ExportResult {
   std::vector<ExportedFile> files;
   uint64_t voxels = 0;
-  std::vector<std::string> notes;  // usage notes for the files
+  std::vector<std::string> notes;  // usage notes for the files, and warnings
 };
 template <class Visitor>
 void fields(Visitor& visit, ExportResult& result) {
