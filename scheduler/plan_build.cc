@@ -2,13 +2,28 @@
 
 #include <optional>
 
+#include "core/fields/field.h"
 #include "core/io/outputs/space_reserve.h"
 #include "core/io/temporary_paths.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/solid/seed.h"
+#include "scheduler/state/job/empty_scene.h"
 #include "scheduler/state/work_folder.h"
 
 namespace voxdag {
+namespace {
+
+void warn_of_empty_scene(const BuildSpec& spec, const IngestState& state, Progress& progress) {
+  const std::string reason = empty_scene_reason(
+      {state.declared_triangles, state.counts.dropped_invalid, state.counts.dropped_outside},
+      state.grid);
+  progress.warn_of_input(
+      {"empty-scene", joined(spec.geometry.scenes),
+       reason + (spec.run.allow_empty ? "; the file will have no nodes" : "; a build refuses it")});
+}
+
+}  // namespace
+
 Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   const BuildSpec full = checked(with_resolution(spec, caller));
   SpaceReserve files(caller.files, full.run.min_free_bytes);
@@ -34,6 +49,7 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   const PreparedScene scene = prepare_scene(full, source, budget, clock, context, no_checkpoints);
   seed_of(full.geometry, scene.state.grid);  // throws for a point outside the grid
   Estimate estimate = estimate_build(full, scene, source, {context, full.run.threads, budget});
+  if (scene.state.counts.triangles == 0) warn_of_empty_scene(full, scene.state, context.progress);
   if (estimate.solid && estimate.solid->warning)
     context.progress.warn_of_input(*estimate.solid->warning);
   estimate.free_disk = context.files.free_space(work.path());

@@ -10,6 +10,7 @@
 #include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/fields/field.h"
 #include "core/io/outputs/space_reserve.h"
 #include "scheduler/check_spec.h"
 #include "scheduler/cluster/advice_on_tasks.h"
@@ -75,17 +76,9 @@ void prepare_work_folder(BuildJob& job) {
 // --allow-empty. `declared` is the number of triangles that the scene's files declare.
 void check_empty(BuildJob& job, uint64_t declared) {
   const BuildReport& report = job.report;
-  std::string message = "has no triangles in the grid";
-  if (declared == 0)
-    message = "has no triangles";
-  else if (report.dropped_invalid == declared)
-    message = "has only invalid triangles (" + count_text(declared) + ")";
-  else if (report.dropped_outside == declared)
-    message = "has " + count_text(declared) + " triangles, all outside the grid (" +
-              grid_range_text(report.grid) + ")";
-  std::string scenes;
-  for (const std::string& scene : job.spec.geometry.scenes)
-    scenes += (scenes.empty() ? "" : ", ") + scene;
+  std::string message =
+      empty_scene_reason({declared, report.dropped_invalid, report.dropped_outside}, report.grid);
+  const std::string scenes = joined(job.spec.geometry.scenes);
   if (!job.spec.run.allow_empty) {
     for (const Warning& warning : job.store->warnings()) message += "; " + warning.text();
     throw empty_scene_error(scenes + ": " + message);

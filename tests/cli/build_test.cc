@@ -218,6 +218,19 @@ TEST_F(BuildCommand, RefusesTheStandardOutput) {
   EXPECT_FALSE(exists("-"));
 }
 
+// `plan` warns of a scene without triangles in the grid, which `build` refuses.
+TEST_F(BuildCommand, PlansWarnOfEmptyScenes) {
+  std::vector<std::string> plan = {"plan", "m.glb", "-r", "64", "--bounds", "900,900,900,1"};
+  const std::string why = "triangles, all outside the grid (from 900,900,900 to 901,901,901); ";
+  const Answer refused = run(plan);
+  EXPECT_EQ(refused.status, 0);
+  EXPECT_NE(refused.err.find(why + "a build refuses it"), std::string::npos) << refused.err;
+  plan.push_back("--allow-empty");
+  const Answer allowed = run(plan);
+  EXPECT_NE(allowed.err.find(why + "the file will have no nodes"), std::string::npos)
+      << allowed.err;
+}
+
 TEST_F(BuildCommand, IsQuiet) {
   const auto say = [&](std::vector<std::string> args) {
     args.push_back("-q");

@@ -4,14 +4,27 @@
 #include "core/base/text.h"
 
 namespace voxdag {
+namespace {
 
-std::string grid_range_text(const Grid& grid) {
+// Returns the corners of a grid: "from 0,0,0 to 1,1,1".
+std::string range_text(const Grid& grid) {
   std::string low, high;
   for (const double at : grid.origin) {
     low += (low.empty() ? "" : ",") + number_text(at);
     high += (high.empty() ? "" : ",") + number_text(at + grid.edge);
   }
   return "from " + low + " to " + high;
+}
+
+}  // namespace
+
+std::string empty_scene_reason(const DroppedTriangles& dropped, const Grid& grid) {
+  if (dropped.declared == 0) return "has no triangles";
+  const std::string count = count_text(dropped.declared);
+  if (dropped.invalid == dropped.declared) return "has only invalid triangles (" + count + ")";
+  if (dropped.outside == dropped.declared)
+    return "has " + count + " triangles, all outside the grid (" + range_text(grid) + ")";
+  return "has no triangles in the grid";
 }
 
 UnbuildableJob empty_scene_error(const std::string& message) {
