@@ -177,6 +177,34 @@ TEST_F(ServiceFailures, ALostQueueCostsNothing) {
   EXPECT_EQ(http_->get("/api/v1/jobs/" + id + "/dag").body, dag);
 }
 
+// Somebody removes the files of a job. The answers name the job and the file.
+TEST_F(ServiceFailures, NamesRemovedFiles) {
+  start();
+  const std::string id = finished_job(), path = "/api/v1/jobs/" + id;
+  ASSERT_TRUE(until([&] { return http_->get(path + "/preview.png").status == 200; }));
+  const Json request = {{"to", "npz"}};
+  const std::string made =
+      Json::parse(post(path + "/exports", request).body).at("links").at("self");
+  ASSERT_TRUE(until([&] { return http_->get(made + "/files/0").status == 200; }));
+  for (const char* file : {"result.vdag", "result.vdag.report.json", "preview.png"})
+    std::filesystem::remove(data("jobs/" + id + "/" + file));
+  std::filesystem::remove(
+      config_.data_folder + made.substr(std::string("/api/v1").size()) + "/" +
+      Json::parse(http_->get(made).body)["files"][0]["name"].get<std::string>());
+  const auto expect = [&](const std::string& url, const std::string& name) {
+    const ClientResponse answer = http_->get(url);
+    EXPECT_EQ(not_problem(answer, 404, "not_found"), "") << url;
+    EXPECT_NE(answer.body.find(name + " of the job " + id + " was removed"), std::string::npos)
+        << answer.body;
+  };
+  expect(path + "/dag", "the result");
+  expect(path + "/tiles", "the result");
+  expect(path + "/report", "the report");
+  expect(path + "/preview.png", "the preview");
+  EXPECT_EQ(not_problem(http_->get(made + "/files/0"), 404, "not_found"), "");
+  EXPECT_NE(http_->get(made + "/files/0").body.find("of the export "), std::string::npos);
+}
+
 // If the queue is lost, a job without a result is adopted as suspended. When it is resumed, it
 // succeeds.
 TEST_F(ServiceFailures, AnUnfinishedJobIsAdopted) {

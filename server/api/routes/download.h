@@ -4,7 +4,9 @@
 #include <memory>
 #include <string>
 
+#include "core/base/error.h"
 #include "core/io/file_system.h"
+#include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
 #include "server/api/routing/route.h"
 
@@ -12,6 +14,21 @@ namespace voxdag::server {
 
 // Returns the job with the id of the call. Throws Problem (404) unless it has succeeded.
 Job finished_job(Context& context, Call& call);
+
+// Returns open(), which opens a file of a job that has succeeded. Throws Problem (404) with the id
+// of the job and `file`, a description of the file, if the file was removed from the service's
+// disk.
+template <class Open>
+auto open_kept(const std::string& job, const std::string& file, const Open& open) {
+  try {
+    return open();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
+    throw not_found(file + " of the job " + job +
+                    " was removed from the disk of the service: expected it to remain until it is "
+                    "deleted by a request; submit a new job of the scene");
+  }
+}
 // Returns the beginning of the file name of a download, NAME-RESOLUTION. NAME is the name of the
 // job, or of its first scene if the job has no name, reduced to characters that are safe in headers
 // and shells.

@@ -92,9 +92,10 @@ Response get_export_file(Context& context, Call& call) {
     throw not_found("the export has no file '" + printable(call.names[2]) +
                     "': expected a number from 0 to " + std::to_string(it.result.files.size() - 1));
   const ExportedFile& file = it.result.files[(*number)[0]];
-  return download(context, call,
-                  context.files.open_own(context.dispatcher.exports().path(it, file.name)),
-                  file.sha256, file.name);
+  auto opened = open_kept(it.job, "the file " + file.name + " of the export " + it.id, [&] {
+    return context.files.open_own(context.dispatcher.exports().path(it, file.name));
+  });
+  return download(context, call, std::move(opened), file.sha256, file.name);
 }
 
 }  // namespace

@@ -24,7 +24,10 @@ std::string file_name(const Job& job) {
 
 Response get_dag(Context& context, Call& call) {
   const Job job = finished_job(context, call);
-  return download(context, call, context.files.open_own(context.dispatcher.folder(job.id).result()),
+  const auto open = [&] {
+    return context.files.open_own(context.dispatcher.folder(job.id).result());
+  };
+  return download(context, call, open_kept(job.id, "the result", open),
                   parse_json<nlohmann::json>(job.result).at("sha256"), file_name(job));
 }
 
@@ -38,8 +41,10 @@ Response stream_file(Context& context, const std::string& path, Response respons
 Response get_report(Context& context, Call& call) {
   auto permit = context.answers.wait();
   const Job job = finished_job(context, call);
-  auto report = parse_json<nlohmann::ordered_json>(read_own_file(
-      context.files, context.dispatcher.folder(job.id).report(), kMaxSentReportBytes));
+  auto report = parse_json<nlohmann::ordered_json>(open_kept(job.id, "the report", [&] {
+    return read_own_file(context.files, context.dispatcher.folder(job.id).report(),
+                         kMaxSentReportBytes);
+  }));
   report["output"] = file_name(job);
   make_printable(report);
   Response response = json_response(200, json_text(report));
@@ -50,12 +55,14 @@ Response get_report(Context& context, Call& call) {
 Response get_preview(Context& context, Call& call) {
   const Job job = finished_job(context, call);
   const std::string path = context.dispatcher.folder(job.id).preview();
-  if (job.preview != Preview::kReady || !context.files.exists(path))
+  if (job.preview != Preview::kReady)
     throw not_found(
         job.preview == Preview::kFailed
             ? "the preview could not be rendered: expected a file that voxdag render can render"
             : "the preview is not rendered yet: expected a request later");
-  return stream_file(context, path, make_response(200, "image/png", "private, max-age=3600"));
+  return open_kept(job.id, "the preview", [&] {
+    return stream_file(context, path, make_response(200, "image/png", "private, max-age=3600"));
+  });
 }
 
 Response get_log(Context& context, Call& call) {

@@ -15,6 +15,7 @@
 #include "server/api/answers/gzip.h"
 #include "server/api/answers/public_problem.h"
 #include "server/api/context/context.h"
+#include "server/api/routes/download.h"
 
 namespace voxdag::server {
 namespace {
@@ -273,7 +274,10 @@ TileAccess open_result(Context& context, const Call& call) {
     throw problem;
   }
   auto permit = tile_permit(context, call);
-  return {context.open_sources.open(context.dispatcher.folder(job.id).result()), std::move(permit)};
+  auto file = open_kept(job.id, "the result", [&] {
+    return context.open_sources.open(context.dispatcher.folder(job.id).result());
+  });
+  return {std::move(file), std::move(permit)};
 }
 
 // Returns make(id, folder, resolution) for the job of the call. Throws Problem (404) if the job has
