@@ -1,6 +1,7 @@
 // voxdag build: its report, its files, its options, its errors.
 #include <sys/stat.h>
 
+#include "core/base/process_limits.h"
 #include "tests/cli/command_line.h"
 
 namespace command_line {
@@ -229,6 +230,16 @@ TEST_F(BuildCommand, PlansWarnOfEmptyScenes) {
   const Answer allowed = run(plan);
   EXPECT_NE(allowed.err.find(why + "the file will have no nodes"), std::string::npos)
       << allowed.err;
+}
+
+// A build with many triangles in a coarse grid needs memory mainly for the triangles.
+TEST_F(BuildCommand, NeedsNoMoreMemoryThanPlanned) {
+  if (VOXDAG_SANITIZED) GTEST_SKIP() << "sanitizers need memory";
+  ASSERT_EQ(run({"generate", "soup", "s.glb", "--triangles", "1000000"}).status, 0);
+  const Json plan = run_json({"plan", "s.glb", "-r", "256"});
+  const Json built = run_json({"build", "s.glb", "-r", "256", "-o", "s.vdag"});
+  EXPECT_GE(plan["memory_bytes"]["high"], built["peak_rss_bytes"]);
+  EXPECT_LT(plan["memory_bytes"]["high"], 2 * built["peak_rss_bytes"].get<double>());
 }
 
 TEST_F(BuildCommand, IsQuiet) {
