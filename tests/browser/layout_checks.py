@@ -32,6 +32,20 @@ FAULTS = """(rows) => {
 }"""
 
 
+# Returns the difference between the heights of the two columns of a page.
+UNEQUAL = """() => {
+  const [left, right] = [...document.querySelector(".two").children].map((e) => e.offsetHeight);
+  return Math.abs(left - right);
+}"""
+
+
+def check_columns(page, limit=200):
+    """Fails if one column of the page is much longer than the other one."""
+    page.set_viewport_size({"width": 1280, "height": 800})
+    difference = page.evaluate(UNEQUAL)
+    assert difference <= limit, f"the columns differ by {difference} pixels"
+
+
 def check_layout(page, pictures, name, visit):
     """Calls visit(page) for each width and theme, and checks the layout of the page it shows."""
     for width, scheme in LAYOUTS:

@@ -39,8 +39,9 @@ class JobPage {
     this.signal = signal;
     this.job = null;
     this.jobEvents = 0;  // number of events "job" received
-    this.places = Object.fromEntries(["head", "actions", "error", "warnings", "result"].map(
-        (name) => [name, h("div", {class: name})]));
+    this.places =
+        Object.fromEntries(["head", "actions", "error", "warnings", "result", "below"].map(
+            (name) => [name, h("div", {class: name})]));
     this.places.error.setAttribute("role", "alert");
     this.link = h("span", {class: "link-state"});
     this.progress = new ProgressView();
@@ -145,6 +146,9 @@ class JobPage {
     this.stagesCard.hidden = ended && stages.length === 0;
     this.cubesCard.hidden = ended && !(job.progress?.subvolumes?.total > 0);
     this.columns.classList.toggle("one", this.cubesCard.hidden);
+    // With the rate, the left column is as high as the subvolumes without this card.
+    const place = this.rateCard.hidden ? this.leftColumn : this.places.below;
+    if (this.aboutCard.parentElement !== place) place.append(this.aboutCard);
     const fails = job.state === "failed";
     if (fails && !this.hasFailed) {
       this.places.error.after(this.log.element);
@@ -168,21 +172,23 @@ class JobPage {
         this.exports.element,
         this.columns =
             h("div", {class: "two"},
-              h("div", {class: "stack"},
-                this.stagesCard =
-                    h("section", {class: "card", "aria-labelledby": "stages-title"},
-                      h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
-                this.cluster.element,
-                this.rateCard =
-                    h("section", {class: "card", "aria-labelledby": "rate-title"},
-                      h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
-                h("section", {class: "card", "aria-labelledby": "about-title"},
-                  h("h2", {id: "about-title"}, "About this job"),
-                  this.about = h("dl", {class: "facts"}))),
+              this.leftColumn =
+                  h("div", {class: "stack"},
+                    this.stagesCard =
+                        h("section", {class: "card", "aria-labelledby": "stages-title"},
+                          h("h2", {id: "stages-title"}, "Stages"), this.timeline.element),
+                    this.cluster.element,
+                    this.rateCard =
+                        h("section", {class: "card", "aria-labelledby": "rate-title"},
+                          h("h2", {id: "rate-title"}, "Rate"), this.rate.element),
+                    this.aboutCard =
+                        h("section", {class: "card", "aria-labelledby": "about-title"},
+                          h("h2", {id: "about-title"}, "About this job"),
+                          this.about = h("dl", {class: "facts"}))),
               this.cubesCard =
                   h("section", {class: "card", "aria-labelledby": "cubes-title"},
                     h("h2", {id: "cubes-title"}, "Subvolumes"), this.cubes.element)),
-        this.log.element);
+        this.places.below, this.log.element);
   }
 
   showHead() {
