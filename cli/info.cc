@@ -191,8 +191,8 @@ void print_levels(const FileFacts& facts) {
 
 void print_components(const FileFacts& facts) {
   const query::ComponentsReport& report = *facts.components;
-  std::printf("  %s components (%u neighbors)%s\n", count_text(report.components).c_str(),
-              facts.connectivity,
+  std::printf("  %s component%s (%u neighbors)%s\n", count_text(report.components).c_str(),
+              report.components == 1 ? "" : "s", facts.connectivity,
               report.components > report.largest.size() ? ", the largest are:" : "");
   if (!report.largest.empty()) std::printf("           voxels  box\n");
   for (const query::Component& c : report.largest)
@@ -244,7 +244,7 @@ FileFacts facts_of(const InfoCommand& command, const std::string& path, CommandC
   facts.connectivity = command.connectivity;
   const query::ComponentRule rule{command.connectivity == 6 ? query::Connectivity::kFaces
                                                             : query::Connectivity::kCorners};
-  const auto progress = make_progress_bar(false);
+  const auto progress = make_progress_bar(command.json || command.csv);
   facts.components = query::find_components(*facts.file, rule, budget, *progress, context.cancel);
   return facts;
 }

@@ -179,6 +179,10 @@ class Edit {
 
 query::CombineReport edit(const EditSpec& spec, FileSystem& files, Progress& progress,
                           const CancelToken& cancel) {
+  if (spec.outside_set && spec.erode == 0)
+    throw Error(ErrorCode::kInvalidInput, option_text("outside_set") +
+                                              " was given without an erosion: expected " +
+                                              option_text("erode"));
   if (spec.cuts.empty() && spec.scenes.empty() && spec.parts.empty() && spec.dilate == 0 &&
       spec.erode == 0)
     throw Error(ErrorCode::kInvalidInput, "no edit was given: expected " + option_text("cut") +
@@ -190,10 +194,6 @@ query::CombineReport edit(const EditSpec& spec, FileSystem& files, Progress& pro
                 option_text("dilate") + " and " + option_text("erode") +
                     " were both given: expected one of them, and the other in an edit of the "
                     "result");
-  if (spec.outside_set && spec.erode == 0)
-    throw Error(ErrorCode::kInvalidInput, option_text("outside_set") +
-                                              " was given without an erosion: expected " +
-                                              option_text("erode"));
   query::LockedOutputs outputs(files,
                                {{spec.output}, inputs_of(spec, files, cancel), spec.replace});
   return Edit(spec, outputs.files(), progress, cancel).run();

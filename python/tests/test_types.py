@@ -6,7 +6,9 @@ import subprocess
 import sys
 import textwrap
 
+import pytest
 import voxdag
+from voxdag._types import SceneWarning
 
 
 def mypy(folder, *arguments):
@@ -88,3 +90,10 @@ def test_types(tmp_path):
         "Found 12 errors",
     ):
         assert expected in user, (expected, user)
+
+
+def test_warnings_have_the_members_of_their_type(tmp_path):
+    mesh = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.warns(UserWarning, match="no colors"):
+        report = voxdag.build(mesh, resolution=16, output=tmp_path / "x.vdag", color=True)
+    assert report["warnings"][0].keys() == SceneWarning.__annotations__.keys()

@@ -213,7 +213,7 @@ def combine(
             force,
             callback,
         )
-    return new.open()
+        return new.open()
 
 
 def edit(
@@ -299,7 +299,7 @@ def edit(
                 force,
                 callback,
             )
-    return new.open()
+        return new.open()
 
 
 def reorder(

@@ -49,7 +49,7 @@ class SceneWarning(TypedDict):
     code: str
     place: str
     message: str
-    total: int
+    count: int
 
 
 class SolidEstimate(TypedDict):

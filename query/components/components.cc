@@ -24,6 +24,7 @@ class ComponentSearch {
         rule_(rule),
         budget_(budget),
         progress_(progress),
+        cancel_(cancel),
         nodes_(file.brick_level() + 1) {}
 
   ComponentsReport run() {
@@ -83,9 +84,9 @@ class ComponentSearch {
       result->voxels += children[i]->voxels;
       bytes += children[i]->charge.bytes();
     }
-    // The two planes that are compared, and the numbers of the components, are not larger than
-    // this.
-    const MemoryCharge planes = charge(2 * bytes);
+    cancel_.check();
+    // An estimate of the memory of the compared planes, the sets of labels, and the result.
+    const MemoryCharge joining = charge(3 * bytes);
     const auto edge = static_cast<uint32_t>(input_.file().resolution() >> (level + 1));
     result->cube = join_components(cubes, edge, rule_);
     return charged(std::move(result));
@@ -108,6 +109,7 @@ class ComponentSearch {
   const ComponentRule rule_;
   MemoryBudget& budget_;
   Progress& progress_;
+  const CancelToken& cancel_;
   std::list<Kept> kept_;  // the results that were used last come first
   // For each level: the results of nodes by their word offset.
   std::vector<std::unordered_map<uint64_t, std::list<Kept>::iterator>> nodes_;

@@ -26,13 +26,22 @@ bool is_before(const Component& a, const Component& b) {
   return std::tie(a.low, a.high) < std::tie(b.low, b.high);
 }
 
-void add_closed(CubeComponents& cube, const Component& component, const ComponentRule& rule) {
+// Call keep_largest() after the last component was added.
+void add_closed(CubeComponents& cube, const Component& component) {
   ++cube.closed;
-  if (cube.largest.size() == rule.largest) {
-    if (rule.largest == 0 || !is_before(component, cube.largest.back())) return;
-    cube.largest.pop_back();
+  cube.largest.push_back(component);
+}
+
+// Sorts the closed components that were added, and keeps the largest ones.
+void keep_largest(CubeComponents& cube, const ComponentRule& rule) {
+  std::vector<Component>& all = cube.largest;
+  if (all.size() > rule.largest) {
+    std::ranges::nth_element(all, all.begin() + static_cast<std::ptrdiff_t>(rule.largest),
+                             is_before);
+    all.resize(rule.largest);
   }
-  cube.largest.insert(std::ranges::upper_bound(cube.largest, component, is_before), component);
+  std::ranges::sort(all, is_before);
+  all.shrink_to_fit();
 }
 
 Component moved(Component component, const std::array<uint32_t, 3>& offset) {
@@ -193,10 +202,11 @@ class Join {
       }
       joined.closed += cube->closed - cube->largest.size();
       for (const Component& component : cube->largest)
-        add_closed(joined, moved(component, offset_of(child)), rule);
+        add_closed(joined, moved(component, offset_of(child)));
     }
     for (const Component& component : closed)
-      if (component.voxels > 0) add_closed(joined, component, rule);
+      if (component.voxels > 0) add_closed(joined, component);
+    keep_largest(joined, rule);
   }
 
   static constexpr uint32_t kNoRow = ~uint32_t{0};
@@ -262,8 +272,9 @@ CubeComponents components_of_brick(uint64_t mask, const ComponentRule& rule) {
     if (is_open)
       cube.open.push_back(component);
     else
-      add_closed(cube, component, rule);
+      add_closed(cube, component);
   }
+  keep_largest(cube, rule);
   for (int axis = 0; axis < 3; ++axis)
     for (int side = 0; side < 2; ++side)
       for (uint32_t u = 0; u < kBrickEdge; ++u)
@@ -285,7 +296,8 @@ CubeComponents join_components(std::span<const CubeComponents* const, 8> childre
 }
 
 void close_all(CubeComponents& cube, const ComponentRule& rule) {
-  for (const Component& component : cube.open) add_closed(cube, component, rule);
+  for (const Component& component : cube.open) add_closed(cube, component);
+  keep_largest(cube, rule);
   cube.open.clear();
   for (auto& face : cube.faces) face.clear();
 }

@@ -89,13 +89,13 @@ class DagInput {
 };
 
 // Returns the offsets of a node's children by their index; kNoNode if a child does not exist. In a
-// damaged file a pointer can equal kNoNode; then the offset is another one that the level cannot
-// have.
+// damaged file a pointer can equal kNoNode, or kNoNode - 1, which query/morphology reserves. Then
+// the offset is another one that the level cannot have.
 inline std::array<uint64_t, 8> children_by_index(const voxdag_reader::Node& node) {
   std::array<uint64_t, 8> children;
   int next = 0;
   for (size_t c = 0; c < 8; ++c)
-    children[c] = node.child_mask >> c & 1 ? std::min(node.child(next++), kNoNode - 1) : kNoNode;
+    children[c] = node.child_mask >> c & 1 ? std::min(node.child(next++), kNoNode - 2) : kNoNode;
   return children;
 }
 

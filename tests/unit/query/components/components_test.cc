@@ -123,6 +123,16 @@ TEST_F(Components, OfAWindingPath) {
   EXPECT_EQ(find({Connectivity::kFaces, 1}).components, 1);
 }
 
+// With connections by faces, each voxel of a checkerboard is a component.
+TEST_F(Components, OfACheckerboard) {
+  oracle::Voxels voxels(64);
+  for (int x = 0; x < 64; ++x)
+    for (int y = 0; y < 64; ++y)
+      for (int z = 0; z < 64; ++z)
+        if ((x + y + z) % 2 == 0) voxels.set(x, y, z);
+  expect_components(voxels);
+}
+
 // Connections by edges and corners across the middle of the grid.
 TEST_F(Components, OfDiagonals) {
   oracle::Voxels diagonals(16);
