@@ -98,7 +98,7 @@ std::string spell_for_running_command(std::string_view name, std::string_view va
   const std::string option = spell_for_command_line(name, {});
   const std::string text = spell_for_command_line(name, value);
   if (command.get_group().empty() || has_option(command, option)) return text;
-  if (name == "allow_empty") return "";  // no other command refuses an empty result
+  if (name == "allow_empty") return "";  // edit has no such option
   const auto is_build = [](const CLI::App* other) { return other->get_name() == "build"; };
   const CLI::App& all = *command.get_parent();
   for (const CLI::App* build : all.get_subcommands(is_build))

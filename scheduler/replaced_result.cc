@@ -52,11 +52,10 @@ std::vector<std::string> as_reported(const std::vector<std::string>& names) {
   return out;
 }
 
-}  // namespace
-
-void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
+// Refuses the output as refuse_result_of_other_scene() does, but also if the work folder has a job.
+void refuse_other_result(FileSystem& files, const BuildSpec& spec) {
   const RunOptions& run = spec.run;
-  if (run.force || files.exists(WorkFolder::store_path(work_folder_of(run)))) return;
+  if (run.force) return;
   const auto file = open_if_there(files, run.output);
   if (!file || file->size() == 0 || !is_global_file(*file)) return;
   const std::vector<std::string> scenes = as_reported(reported_scenes(spec));
@@ -72,14 +71,21 @@ void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
                                             (force.empty() ? "" : "; " + force + " replaces it"));
 }
 
+}  // namespace
+
+void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec) {
+  if (!files.exists(WorkFolder::store_path(work_folder_of(spec.run))))
+    refuse_other_result(files, spec);
+}
+
 void guard_outputs(GuardedOutputs& files, const RunOptions& run) {
   files.guard_output(run.output);
   if (const std::string path = report_path(run); !path.empty()) files.guard_output(path);
 }
 
 void check_changed_output(BuildJob& job, GuardedOutputs& files) {
-  if (files.is_unchanged(job.spec.run.output)) return;
-  refuse_result_of_other_scene(files, job.spec);
+  if (files.is_unchanged()) return;
+  refuse_other_result(files, job.spec);
   check_places(job.spec, job.scene, job.context);
   guard_outputs(files, job.spec.run);
 }

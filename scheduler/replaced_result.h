@@ -16,9 +16,9 @@ void refuse_result_of_other_scene(FileSystem& files, const BuildSpec& spec);
 // Guards the build's output files from now on. The files that exist now may be replaced.
 void guard_outputs(GuardedOutputs& files, const RunOptions& run);
 
-// Call it when the job has its locks. If another build wrote the output while this build waited for
-// a lock, checks the places again (check_places() and refuse_result_of_other_scene()), and guards
-// the new files.
+// Call it when the job has its locks. If another build wrote output files while this build waited
+// for a lock, checks the places again (check_places()), refuses the result of another scene, and
+// guards the new files.
 void check_changed_output(BuildJob& job, GuardedOutputs& files);
 
 }  // namespace voxdag

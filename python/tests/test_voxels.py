@@ -59,16 +59,13 @@ def test_points():
 
 def test_grids_far_from_zero():
     """Voxels far from 0 are right or refused, and never lost."""
-    voxels = np.argwhere(np.ones((4, 2, 3)))
-    near, far = (1.5e14, -1e14, 0), (0, 0, -3e14)
-    assert voxdag.from_voxels(voxels, origin=near).voxels == len(voxels)
-    for build in (voxdag.from_voxels, voxdag.from_points):
-        with pytest.raises(voxdag.Error, match="cannot distinguish the voxels there"):
-            build(
-                voxels + (0 if build is voxdag.from_voxels else np.array(far)),
-                voxel_size=1,
-                origin=far,
-            )
+    dense = np.ones((4, 2, 3), bool)
+    assert voxdag.from_dense(dense, origin=(1.5e14, -1e14, 0)).voxels == dense.sum()
+    far = (0, 0, -3e14)
+    with pytest.raises(voxdag.Error, match="too imprecise there"):
+        voxdag.from_dense(dense, origin=far)
+    with pytest.raises(voxdag.Error, match="too imprecise there"):
+        voxdag.from_points(np.argwhere(dense) + np.array(far), 1)
 
 
 def test_nothing():

@@ -37,7 +37,7 @@ class Mesh:
                   float32.
     triangles     array (M, 3) of integers: for each triangle, the indexes of its three vertices. If
                   it is None, the vertices are points. Each point sets one voxel, unless the option
-                  `point_radius` is given.
+                  `point_radius` is given. A mesh whose array has no rows sets no voxels.
     colors        array (N, 3) or (N, 4): red, green, blue and optionally alpha of each vertex, as
                   integers from 0 to 255 or floats from 0 to 1. Colors are in sRGB; alpha is linear.
     face_colors   array (M, 3) or (M, 4): the color of each triangle, in the same form. A mesh

@@ -239,8 +239,8 @@ def _dag_of(
     if farthest > voxel_size * _MAX_VOXELS_FROM_ZERO:
         raise Error(
             f"the grid from {origin.tolist()} reaches the coordinate {farthest:g}: expected at "
-            f"most 2^48 times the voxel size, {voxel_size:g}, because numbers of 64 bits cannot "
-            "distinguish the voxels there",
+            f"most 2^48 times the voxel size, {voxel_size:g}, because numbers of 64 bits are too "
+            "imprecise there",
             "invalid_input",
         )
     chosen = cast(BuildOptions, {"allow_empty": True, **options})

@@ -112,9 +112,9 @@ void append(std::vector<FaceRun>& runs, const FaceRun& run) {
   runs.push_back(run);
 }
 
-class Join {
+class CubeJoin {
  public:
-  Join(std::span<const CubeComponents* const, 8> children, uint32_t edge)
+  CubeJoin(std::span<const CubeComponents* const, 8> children, uint32_t edge)
       : children_(children), edge_(edge), sets_(number_labels()) {}
 
   CubeComponents run(const ComponentRule& rule) {
@@ -292,7 +292,7 @@ CubeComponents components_of_brick(uint64_t mask, const ComponentRule& rule) {
 
 CubeComponents join_components(std::span<const CubeComponents* const, 8> children, uint32_t edge,
                                const ComponentRule& rule) {
-  return Join(children, edge).run(rule);
+  return CubeJoin(children, edge).run(rule);
 }
 
 void close_all(CubeComponents& cube, const ComponentRule& rule) {

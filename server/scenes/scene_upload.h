@@ -1,8 +1,8 @@
 // Writes one request's part of an upload to the store as the bytes arrive. Records the received
 // bytes at least every 64 MiB, and with the first bytes that arrive a second or more after the last
 // record. If the request breaks off, all received bytes are recorded, and the client can continue
-// after them. Bytes whose digest was wrong are not recorded. If no byte of an upload was received,
-// its record and its file are removed. Used by one thread.
+// after them. A wrong digest discards the recorded bytes of the part. If no byte of an upload was
+// received, its record and its file are removed. Used by one thread.
 #pragma once
 
 #include <functional>

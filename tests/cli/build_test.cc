@@ -183,6 +183,18 @@ TEST_F(BuildCommand, WritesTheReportWhereItIsWanted) {
   EXPECT_EQ(contents("letter.txt"), "dear");
 }
 
+// A scene without triangles, which has the job's options, leaves the finished work of the job.
+TEST_F(BuildCommand, AnEmptySceneKeepsTheWorkOfAnotherScene) {
+  build({"--keep-work"});
+  ASSERT_TRUE(exists("m.vdag.work/job.db"));
+  put("empty.stl", "solid\nendsolid\n");
+  expect_error(2, "has no triangles",
+               {"build", "empty.stl", "-r", "64", "-o", "m.vdag", "--force"});
+  EXPECT_TRUE(exists("m.vdag.work/job.db"));
+  const std::vector<std::string> resumed = {"build", "m.glb", "-r", "64", "-o", "m.vdag"};
+  EXPECT_GT(run_json(resumed)["subvolumes"]["reused"], 0);
+}
+
 // If no run of a job can succeed, its work folder is removed, so the corrected command is not
 // refused because of another job in the folder.
 TEST_F(BuildCommand, ACorrectedOptionNeedsNoRestart) {
@@ -197,11 +209,6 @@ TEST_F(BuildCommand, ACorrectedOptionNeedsNoRestart) {
   expect_error(2, "the surface touches", with(seeded, {"--seed", "1.5,3.2,4.5", "--radius", "9"}));
   EXPECT_FALSE(exists("s.vdag.work"));
   EXPECT_EQ(run(with(seeded, {"--seed", "4.5,4.5,4.5"})).status, 0);
-  put("p.csv", "1,1,1\n5,5,5\n");
-  const std::vector<std::string> thin = {"build", "p.csv", "-r", "16", "-o", "t.vdag", "--thin"};
-  expect_error(2, "sets a voxel", thin);
-  EXPECT_FALSE(exists("t.vdag.work"));
-  EXPECT_EQ(run(with(thin, {"--point-radius", "0.5"})).status, 0);
 }
 
 // Results are not written to the standard output, and there is no file with the name "-".

@@ -215,8 +215,6 @@ TEST_F(Edit, RefusesBadArguments) {
   EXPECT_FALSE(exists("x.vdag") || exists("x.vdag.partial") || exists("x.vdag.lock"));
 }
 
-// The output must not be a pasted file, an added scene or a file that an added scene names, also
-// not with --force.
 // `edit` shares the code of `build`, but not all of its options. Messages do not recommend options
 // that only `build` has as if `edit` had them.
 TEST_F(Edit, RecommendsItsOwnOptions) {
@@ -226,7 +224,7 @@ TEST_F(Edit, RecommendsItsOwnOptions) {
     return {"edit", "a.vdag", "--add", scene, "-o", "x.vdag"};
   };
   expect_error(2,
-               "far.obj: has 1 triangles, all outside the grid (from -1024,-1024,-1024 to "
+               "far.obj: has 1 triangle, all outside the grid (from -1024,-1024,-1024 to "
                "1024,1024,1024): expected a scene that sets voxels in the grid",
                add("far.obj"));
   expect_error(2, "--skip-invalid of voxdag build", add("bad.obj"));
@@ -235,6 +233,8 @@ TEST_F(Edit, RecommendsItsOwnOptions) {
                {"build", "far.obj", "-r", "64", "--bounds", "0,0,0,1", "-o", "x.vdag"});
 }
 
+// The output must not be a pasted file, an added scene or a file that an added scene names, also
+// not with --force.
 TEST_F(Edit, KeepsItsInputs) {
   const auto expect_kept = [&](const std::string& name, const std::string& option,
                                const std::string& value) {

@@ -23,9 +23,11 @@ void GuardedOutputs::guard_output(const std::string& path) {
   guard(path + ".partial");
 }
 
-bool GuardedOutputs::is_unchanged(const std::string& path) {
-  const auto guarded = find(path);
-  return !guarded || (guarded->exists ? is_at(path, *guarded) : !file_at(path, false).exists);
+bool GuardedOutputs::is_unchanged() {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [path, file] : guarded_)
+    if (file.exists ? !is_at(path, file) : file_at(path, false).exists) return false;
+  return true;
 }
 
 std::unique_ptr<WritableFile> GuardedOutputs::create(const std::string& path) {

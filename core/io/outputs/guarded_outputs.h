@@ -25,8 +25,8 @@ class GuardedOutputs : public ForwardingFiles {
   void guard(const std::string& path);
   // Guards `path` and its temporary name, `path` + ".partial".
   void guard_output(const std::string& path);
-  // True if no other program has created, changed or removed the file at a guarded path.
-  bool is_unchanged(const std::string& path);
+  // True if no other program has created, changed or removed the file at any guarded path.
+  bool is_unchanged();
 
   // These functions throw Error{kInvalidInput} if they would change a file of another program.
   std::unique_ptr<WritableFile> create(const std::string& path) override;

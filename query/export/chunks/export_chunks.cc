@@ -132,10 +132,12 @@ class ChunkWriter {
     write_manifest(std::move(list));
     return report_;
   }
-  // Removes the files and the folders that this export has created.
+  // Removes the files and the folders that this export has created. Ignores errors, because the
+  // caller already handles an error. A folder with files of other programs remains.
   void undo() {
-    for (const std::string& path : written_) files_.remove(path);
-    for (; !folders_.empty(); folders_.pop_back()) files_.remove_directory(folders_.back());
+    for (const std::string& path : written_) ignore_errors([&] { files_.remove(path); });
+    for (; !folders_.empty(); folders_.pop_back())
+      ignore_errors([&] { files_.remove_directory(folders_.back()); });
   }
 
  private:
@@ -173,8 +175,17 @@ class ChunkWriter {
             {"voxels", report.voxels},
             {"files", std::move(list)}};
   }
+  template <class Action>
+  static void ignore_errors(const Action& action) {
+    try {
+      action();
+    } catch (const Error&) {
+    }
+  }
+  // Makes a folder and its missing parents.
   void make_folder(const std::string& path) {
     if (files_.exists(path)) return;
+    make_folder(parent_directory(path));
     files_.make_directories(path);
     folders_.push_back(path);
   }

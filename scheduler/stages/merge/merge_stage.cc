@@ -67,8 +67,8 @@ std::vector<ArtifactRef> distinct_artifacts(std::span<const StoredSubvolume> sub
 
 namespace {
 
-// Handles a scene whose triangles set no voxel: throws UnbuildableJob{kInvalidInput}, or only warns
-// if the build has --allow-empty.
+// Handles a scene whose triangles set no voxel: throws Error{kInvalidInput}, or only warns if the
+// build has --allow-empty.
 void check_voxels(const BuildJob& job) {
   const GeometryOptions& geometry = job.spec.geometry;
   std::string message = "none of the " + std::to_string(job.report.triangles) +

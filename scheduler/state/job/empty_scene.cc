@@ -23,11 +23,12 @@ std::string empty_scene_reason(const DroppedTriangles& dropped, const Grid& grid
   const std::string count = count_text(dropped.declared);
   if (dropped.invalid == dropped.declared) return "has only invalid triangles (" + count + ")";
   if (dropped.outside == dropped.declared)
-    return "has " + count + " triangles, all outside the grid (" + range_text(grid) + ")";
+    return "has " + count + (dropped.declared == 1 ? " triangle" : " triangles") +
+           ", all outside the grid (" + range_text(grid) + ")";
   return "has no triangles in the grid";
 }
 
-UnbuildableJob empty_scene_error(const std::string& message) {
+Error empty_scene_error(const std::string& message) {
   const std::string allow = option_text("allow_empty");
   return {ErrorCode::kInvalidInput,
           message + (allow.empty() ? ": expected a scene that sets voxels in the grid"

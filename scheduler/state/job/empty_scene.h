@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "core/base/error.h"
 #include "core/geometry/grid.h"
-#include "scheduler/spec/unbuildable_job.h"
 
 namespace voxdag {
 
@@ -19,6 +19,6 @@ std::string empty_scene_reason(const DroppedTriangles& dropped, const Grid& grid
 
 // Returns the error for a scene that sets no voxel. `message` names the scene and the reason. Names
 // the option allow_empty to users who have it.
-UnbuildableJob empty_scene_error(const std::string& message);
+Error empty_scene_error(const std::string& message);
 
 }  // namespace voxdag

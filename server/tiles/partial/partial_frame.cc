@@ -55,7 +55,8 @@ auto with_plan(FileSystem& files, const JobFolder& folder, const Read& read) {
 }  // namespace
 
 bool is_planned(FileSystem& files, const JobFolder& folder) {
-  return files.exists(folder.work()) && files.exists(folder.subvolumes());
+  return files.exists(folder.work()) && files.exists(folder.subvolumes()) &&
+         !files.exists(folder.report());
 }
 
 uint64_t read_planned_total(FileSystem& files, const JobFolder& folder) {

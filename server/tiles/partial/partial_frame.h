@@ -15,8 +15,9 @@ namespace voxdag::server {
 // Returns the built subvolumes as JSON, each with its coarse brick.
 std::string describe_cubes(const CoarseCubes& cubes, uint64_t resolution);
 
-// True if the job has listed its planned subvolumes and has a work folder. In the first seconds of
-// a build, the work folder has no job store, because the build keeps the store in memory.
+// True if the job has listed its planned subvolumes, has a work folder, and has not written its
+// result. In the first seconds of a build, the work folder has no job store, because the build
+// keeps the store in memory.
 bool is_planned(FileSystem& files, const JobFolder& folder);
 // Returns the number of planned subvolumes. Throws like read_frame().
 uint64_t read_planned_total(FileSystem& files, const JobFolder& folder);

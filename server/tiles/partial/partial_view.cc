@@ -42,7 +42,8 @@ bool has_job_store(FileSystem& files, const JobFolder& folder) {
   const std::string path = WorkFolder::store_path(folder.work());
   try {
     return files.exists(path) && files.open_own(path)->size() > 0;
-  } catch (const Error&) {
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kNotFound) throw;
     return false;  // the file was removed after exists() had found it
   }
 }

@@ -76,31 +76,49 @@ TEST_F(BuildProtection, WaitsForTheLocksOfADyingBuild) {
 TEST_F(BuildProtection, AnOutputWrittenDuringTheWaitIsCheckedAgain) {
   const std::string other_scene = folder_.file("other.glb");
   write_spheres(other_scene, 5000);
-  for (const bool is_same : {true, false}) {
-    SCOPED_TRACE(is_same);
-    BuildSpec other = spheres_build(is_same ? scene() : other_scene, folder_.file("first.vdag"));
-    const std::string sha256 = run_build(other, context()).sha256;
-    std::filesystem::remove(output());
-    std::filesystem::remove(output() + ".report.json");
-    auto held = system_files().try_lock(OutputLock::path_of(output()));
-    ASSERT_TRUE(held);
-    warnings_.on_warning = [&] {
-      for (const char* suffix : {"", ".report.json"})
-        std::filesystem::copy_file(other.run.output + suffix, output() + suffix);
-      held.reset();
-    };
-    if (is_same) {
-      EXPECT_EQ(run_build(spec(), context()).sha256, sha256);
-    } else {
-      const Error error = error_of([&] { run_build(spec(), context()); });
-      EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
-      EXPECT_NE(error.message().find("is the result of another scene"), std::string::npos)
-          << error.message();
-      EXPECT_EQ(std::filesystem::file_size(output()), std::filesystem::file_size(other.run.output));
+  for (const bool keep_work : {false, true})
+    for (const bool is_same : {true, false}) {
+      SCOPED_TRACE(testing::Message() << "keep_work " << keep_work << ", same scene " << is_same);
+      BuildSpec waiting = spec();
+      waiting.run.keep_work = keep_work;
+      const BuildSpec other =
+          spheres_build(is_same ? scene() : other_scene, folder_.file("first.vdag"));
+      const std::string sha256 = run_build(other, context()).sha256;
+      for (const char* suffix : {"", ".report.json", ".work"})
+        std::filesystem::remove_all(output() + suffix);
+      auto held = system_files().try_lock(OutputLock::path_of(output()));
+      ASSERT_TRUE(held);
+      warnings_.on_warning = [&] {
+        for (const char* suffix : {"", ".report.json"})
+          std::filesystem::copy_file(other.run.output + suffix, output() + suffix);
+        held.reset();
+      };
+      if (is_same) {
+        EXPECT_EQ(run_build(waiting, context()).sha256, sha256);
+      } else {
+        const Error error = error_of([&] { run_build(waiting, context()); });
+        EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+        EXPECT_NE(error.message().find("is the result of another scene"), std::string::npos)
+            << error.message();
+        EXPECT_EQ(std::filesystem::file_size(output()),
+                  std::filesystem::file_size(other.run.output));
+      }
+      warnings_.on_warning = nullptr;
+      EXPECT_EQ(std::filesystem::exists(output() + ".work"), keep_work && is_same);
     }
-    warnings_.on_warning = nullptr;
-    EXPECT_FALSE(std::filesystem::exists(output() + ".work"));
-  }
+}
+
+// The other build can also have been killed while it wrote.
+TEST_F(BuildProtection, APartialFileWrittenDuringTheWaitIsReplaced) {
+  const std::string partial = output() + ".partial";
+  auto held = system_files().try_lock(OutputLock::path_of(output()));
+  ASSERT_TRUE(held);
+  warnings_.on_warning = [&] {
+    std::ofstream(partial) << std::string(10000, '\0');
+    held.reset();
+  };
+  EXPECT_EQ(run_build(spec(), context()).sha256.size(), 64u);
+  EXPECT_FALSE(std::filesystem::exists(partial));
 }
 
 // If a lock is not released in time, the build fails with kIo, a transient error, so that the

@@ -129,8 +129,8 @@ VOXDAG_SLICES_INLINE void find_components_with(const VoxelBlock& block, const in
     empty = empty & in_block;
   }
   out.count = 0;
-  out.empty = 0;
-  for (int i = 0; i < 8; ++i) out.empty += __builtin_popcountll(slices::word(empty, i));
+  out.empty_voxels = 0;
+  for (int i = 0; i < 8; ++i) out.empty_voxels += __builtin_popcountll(slices::word(empty, i));
   for (uint32_t left = slices::corners_in<kLast>(empty); left != 0;) {
     const int first = __builtin_ctz(left);
     uint32_t from = 0;

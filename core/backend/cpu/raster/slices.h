@@ -28,8 +28,8 @@ struct BlockComponents {
   uint32_t corners[8];  // corners of each entry, as a bit set by child index
   bool is_alike[8];     // all corners of the entry have the same class
   Slices voxels[8];
-  Slices rest;  // empty voxels of components without a corner
-  int empty;    // number of the block's empty voxels
+  Slices rest;       // empty voxels of components without a corner
+  int empty_voxels;  // number of the block's empty voxels
 };
 
 }  // namespace voxdag::cpu

@@ -193,7 +193,7 @@ void TileFiller::insert_units(uint64_t key, const VoxelBlock& block) {
         static_cast<uint16_t>(kernels_.add_slices(components_.voxels[0], units.first));
     units.corners[0] = static_cast<uint8_t>(components_.corners[0]);
   }
-  units.voxels[1] = static_cast<uint16_t>(components_.empty - units.voxels[0]);
+  units.voxels[1] = static_cast<uint16_t>(components_.empty_voxels - units.voxels[0]);
   units.corners[1] = static_cast<uint8_t>(components_.corners[count - 1]);
   memo_.insert(key, block, units);
 }

@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/format/checksum.h"
 #include "core/format/global/open_global.h"
+#include "tests/support/error_of.h"
 #include "tests/unit/query/query_files.h"
 
 namespace voxdag::query {
@@ -133,6 +134,11 @@ TEST_F(ExportChunks, ACanceledExportLeavesNoFolders) {
   std::filesystem::create_directories(folder());
   EXPECT_THROW(exported(16, 2), Error);
   EXPECT_TRUE(std::filesystem::is_empty(folder()));
+  // A file of another program keeps its folder, and does not hide the error.
+  write_bytes(folder() + "/notes", "a");
+  replace_ = true;
+  EXPECT_EQ(error_of([&] { exported(16, 2); }).code(), ErrorCode::kCanceled);
+  EXPECT_TRUE(std::filesystem::exists(folder() + "/notes"));
 }
 
 // An export of a region without voxels succeeds, and writes no chunks.
