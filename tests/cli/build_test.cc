@@ -189,9 +189,9 @@ TEST_F(BuildCommand, AnEmptySceneKeepsTheWorkOfAnotherScene) {
   ASSERT_TRUE(exists("m.vdag.work/job.db"));
   put("empty.stl", "solid\nendsolid\n");
   expect_error(2, "has no triangles",
-               {"build", "empty.stl", "-r", "64", "-o", "m.vdag", "--force"});
+               {"build", "empty.stl", "-r", "128", "-o", "m.vdag", "--force"});
   EXPECT_TRUE(exists("m.vdag.work/job.db"));
-  const std::vector<std::string> resumed = {"build", "m.glb", "-r", "64", "-o", "m.vdag"};
+  const std::vector<std::string> resumed = {"build", "m.glb", "-r", "128", "-o", "m.vdag"};
   EXPECT_GT(run_json(resumed)["subvolumes"]["reused"], 0);
 }
 

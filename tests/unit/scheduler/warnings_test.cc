@@ -106,7 +106,7 @@ TEST_F(SceneWarnings, AnEmptySceneIsAnErrorThatSaysWhy) {
   EXPECT_THAT(message(), HasSubstr("fewer than three corners"));
   write_scene("3 0 1 2\n", 1);
   spec_.geometry.bounds = {{50, 50, 50, 1}};
-  EXPECT_THAT(message(), HasSubstr("1 triangles, all outside the grid"));
+  EXPECT_THAT(message(), HasSubstr("has 1 triangle, all outside the grid"));
   spec_.run.allow_empty = true;
   EXPECT_EQ(build().warnings.back().code, "empty-scene");
 }
