@@ -180,7 +180,18 @@ class ExportOptions(TypedDict, total=False):
     progress: Progress
 
 
-class EditOptions(TypedDict, total=False):
+class MorphologyOptions(TypedDict, total=False):
+    """Options of Dag.dilate() and Dag.erode()."""
+
+    color_resolution: int
+    no_attributes: bool
+    memory: int | str | None
+    threads: int
+    force: bool
+    progress: Progress
+
+
+class EditOptions(MorphologyOptions, total=False):
     """Options of edit()."""
 
     cut: str | Sequence[str]
@@ -191,23 +202,6 @@ class EditOptions(TypedDict, total=False):
     outside_set: bool
     clip: bool
     fill_color: tuple[int, int, int] | None
-    color_resolution: int
-    no_attributes: bool
-    memory: int | str | None
-    threads: int
-    force: bool
-    progress: Progress
-
-
-class MorphologyOptions(TypedDict, total=False):
-    """Options of Dag.dilate() and Dag.erode()."""
-
-    color_resolution: int
-    no_attributes: bool
-    memory: int | str | None
-    threads: int
-    force: bool
-    progress: Progress
 
 
 class ReorderOptions(TypedDict, total=False):
