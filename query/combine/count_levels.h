@@ -12,10 +12,10 @@
 #include <memory>
 #include <optional>
 
-#include "query/combine/node_values.h"
 #include "query/combine/operation.h"
 #include "query/combine/pair_levels.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/node_values.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

@@ -15,7 +15,7 @@
 #include <memory>
 
 #include "query/combine/operation.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

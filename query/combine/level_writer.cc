@@ -4,13 +4,10 @@
 #include <optional>
 #include <utility>
 
-#include "query/combine/node_values.h"
+#include "query/combine/spill/kept_places.h"
+#include "query/combine/spill/node_values.h"
 
 namespace voxdag::query {
-
-// For each kept node (pair_levels.h) of a level of an input file: its word offset in the new file.
-using KeptPlaces = NodeValues<uint64_t>;
-
 namespace {
 
 // Visits the kept nodes of a level of an input file. Returns each as a Row (result_rows.h) with its

@@ -14,7 +14,7 @@
 
 #include "query/combine/pair_levels.h"
 #include "query/combine/result_rows.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

@@ -13,7 +13,7 @@
 #include "query/combine/combine.h"
 #include "query/combine/join.h"
 #include "query/combine/pair_levels.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

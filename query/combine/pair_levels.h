@@ -20,7 +20,7 @@
 #include "query/combine/operation.h"
 #include "query/combine/result_rows.h"
 #include "query/combine/shape.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

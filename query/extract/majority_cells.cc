@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "core/base/popcount8.h"
-#include "query/combine/node_values.h"
+#include "query/combine/spill/node_values.h"
 #include "query/dag/dag_input.h"
 #include "query/dag/dag_view.h"
 
@@ -15,7 +15,7 @@ namespace {
 
 // The free memory divided by these numbers limits three parts: the voxel counts of one level (two
 // levels are in memory at any time), a window of lookups, and a list of SpillSpace
-// (query/combine/node_values.h, spill.h).
+// (query/combine/spill/node_values.h, spill.h).
 constexpr uint64_t kCountShare = 4;
 constexpr uint64_t kCountWindowShare = 32;
 constexpr uint64_t kCountListShare = 1024;

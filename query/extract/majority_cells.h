@@ -2,9 +2,9 @@
 //
 // The number of voxels below each node is computed once per node of the DAG, from the bricks up to
 // the level of the cells. The nodes are read in the order of the file. If the numbers of a level do
-// not fit in memory, they are in a scratch file (query/combine/node_values.h). This class finally
-// keeps only one bit for each two words of the cells' level, which is enough because every node has
-// at least two words.
+// not fit in memory, they are in a scratch file (query/combine/spill/node_values.h). This class
+// finally keeps only one bit for each two words of the cells' level, which is enough because every
+// node has at least two words.
 //
 // If the cells have two voxels per edge, they are octants of bricks, and this class needs no bits.
 // Immutable after construction; safe to use from several threads.

@@ -22,7 +22,7 @@
 #include "core/base/progress.h"
 #include "query/combine/pair_levels.h"
 #include "query/combine/result_rows.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 #include "query/morphology/steps.h"
 

@@ -9,7 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/format/global/node_index.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 
 namespace voxdag::query {
 

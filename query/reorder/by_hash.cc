@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "core/base/popcount8.h"
-#include "query/combine/node_values.h"
 #include "query/combine/result_rows.h"
+#include "query/combine/spill/node_values.h"
 
 namespace voxdag::query {
 namespace {

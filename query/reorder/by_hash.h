@@ -5,7 +5,7 @@
 
 #include "core/base/progress.h"
 #include "core/format/global/global_writer.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

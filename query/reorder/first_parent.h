@@ -16,7 +16,7 @@
 
 #include "core/base/progress.h"
 #include "core/format/global/global_writer.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 #include "query/reorder/word_queue.h"
 

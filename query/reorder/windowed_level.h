@@ -19,7 +19,7 @@
 #include <span>
 
 #include "core/base/page_buffer.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

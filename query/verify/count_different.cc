@@ -16,7 +16,7 @@
 #include "core/format/verify/verify_checksums.h"
 #include "core/io/outputs/temporary_work.h"
 #include "query/combine/operation.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 #include "query/dag/dag_input.h"
 
 namespace voxdag::query {

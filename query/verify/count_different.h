@@ -4,8 +4,8 @@
 // If the files and a table of all compared pairs of nodes fit in memory, core/format/global/diff.h
 // compares them. Otherwise, both DAGs are descended together, level by level. Each distinct pair of
 // nodes is divided once, and has the number of places of the grid at which it occurs. The pairs of
-// a level are sorted by external sorting (query/combine/spill.h), so both files are read almost in
-// their order.
+// a level are sorted by external sorting (query/combine/spill/spill.h), so both files are read
+// almost in their order.
 #pragma once
 
 #include <cstdint>

@@ -20,7 +20,7 @@
 
 #include "core/base/host_device.h"
 #include "core/format/global/voxdag_reader.h"
-#include "query/combine/spill.h"
+#include "query/combine/spill/spill.h"
 
 namespace voxdag::query {
 
