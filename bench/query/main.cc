@@ -1,11 +1,12 @@
 // Measures the speed of queries on one core, with the file in memory. It compares this library, a
 // plain loop over the reader, and OpenVDB and OctoMap (if they are installed) on the same cells.
 //
-//     bench_query [--levels N] [--picture EDGE] [--rays] [--scene SCENE] FILE.vdag...
+//     bench_query [--levels N] [--picture EDGE] [--rays] [--cold] [--scene SCENE] FILE.vdag...
 //
 // --levels: the queries use the grid of 2^N cells per edge (default: the file's grid), and rays
 // stop at its cells. --picture: casts rays through the pixels of a square picture with this edge
-// (default: 1024). --rays: measures only rays. --scene: also casts the rays with Embree (if it is
+// (default: 1024). --rays: measures only rays. --cold: measures only the page faults of a picture
+// of a file that is not in memory. --scene: also casts the rays with Embree (if it is
 // installed) at the triangles of this scene, from which the following files were built.
 #include <cmath>
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include <limits>
 #include <string>
 
+#include "bench/query/cold.h"
 #include "bench/query/embree.h"
 #include "bench/query/others.h"
 #include "bench/query/query_set.h"
@@ -227,10 +229,12 @@ struct Settings {
   uint32_t grid_levels = 20;
   int picture = 1024;
   bool only_rays = false;
+  bool only_cold = false;
   std::string scene;  // empty: no Embree
 };
 
 void measure(const std::string& path, const Settings& settings) {
+  if (settings.only_cold) return measure_cold(path);
   const DagFile dag(path);
   const uint32_t levels = std::min(settings.grid_levels, dag.grid_levels());
   std::printf("%s, grid of 2^%u\n", path.c_str(), levels);
@@ -271,6 +275,8 @@ int run(int argc, char** argv) {
       settings.picture = std::max(8, std::atoi(argv[++i]) / 8 * 8);
     else if (std::strcmp(argv[i], "--rays") == 0)
       settings.only_rays = true;
+    else if (std::strcmp(argv[i], "--cold") == 0)
+      settings.only_cold = true;
     else if (std::strcmp(argv[i], "--scene") == 0 && i + 1 < argc)
       settings.scene = argv[++i];
     else

@@ -3,8 +3,9 @@
 //
 //     bench_tiles [--size WxH] [--pixels P --views VIEWS] FILE.vdag
 //
-// For each depth, it prints the number of tiles that a viewer must load, and their bytes
-// (uncompressed, and with gzip, tile by tile),
+// It prints the cameras of five views, as lines of a file VIEWS. For each depth, it prints the
+// number of tiles that a viewer must load, and their bytes (uncompressed, and with gzip, tile by
+// tile),
 //   - until no cell of the view `auto` is wider than 16 pixels,
 //   - until no cell is wider than one pixel, for each of five views and for all five together.
 //
@@ -113,6 +114,21 @@ std::vector<View> views_of_file(const DagView& dag, const voxdag_reader::File& f
   return views;
 }
 
+// Prints views as lines of a file VIEWS.
+void print_cameras(const std::vector<View>& views, const DagView& dag,
+                   const voxdag_reader::File& file) {
+  const double scale = file.edge() / static_cast<double>(dag.resolution());
+  for (const auto& [name, placement] : views) {
+    double eye[3], target[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      eye[axis] = file.origin()[axis] + placement.eye[axis] * scale;
+      target[axis] = file.origin()[axis] + placement.target[axis] * scale;
+    }
+    std::printf("%s --camera %.9g,%.9g,%.9g --target %.9g,%.9g,%.9g --fov %.9g\n", name.c_str(),
+                eye[0], eye[1], eye[2], target[0], target[1], target[2], placement.fov_degrees);
+  }
+}
+
 void print(uint32_t depth, const char* what, size_t tiles, const Bytes& bytes) {
   std::printf("depth %u  %-14s %7zu tiles  %8.2f MB  %8.2f MB packed\n", depth, what, tiles,
               static_cast<double>(bytes.plain) / 1e6, static_cast<double>(bytes.packed) / 1e6);
@@ -183,6 +199,7 @@ void run(const std::string& path, int width, int height) {
     const auto file = open_global_file(path);
     const DagView dag(*file);
     const auto views = views_of(dag, static_cast<double>(width) / height, width, height);
+    print_cameras(views, dag, *file);
     const auto first = NeededTiles(dag, kFirstPixels).find(views[0].placement, width, height);
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
       print(depth, "first picture", first[depth].size(), bytes_of(dag, depth, first[depth]));
