@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -54,7 +55,7 @@ class CombinedColors {
         moved_b_(from.moved_b),
         moved_b_dag_(from.moved_b),
         fill_(from.fill),
-        has_nearest_(from.has_nearest),
+        nearest_reach_(from.nearest_reach),
         cancel_(cancel),
         levels_(from.levels),
         names_charge_(budget, 0, "lists of materials") {
@@ -269,6 +270,7 @@ class CombinedColors {
   struct Readers {
     std::vector<ColorCursor> cursors;
     std::vector<uint64_t> verified;
+    std::optional<NearestFinder> nearest = {};
   };
 
   // Finds the value of the cell of A that is nearest to a finest cell. Returns null if A has no
@@ -276,8 +278,9 @@ class CombinedColors {
   const ColorRegion* find_nearest_value(Readers& readers, uint64_t code, uint64_t& i) const {
     AttributeSource& source = *sources_[0];
     pages_->visit();
-    const Nearest nearest =
-        find_nearest(source.dag(), levels_, position_of(code), ~uint64_t{0} >> 1);
+    if (!readers.nearest) readers.nearest.emplace(source.dag(), levels_);
+    const Nearest nearest = readers.nearest->find(position_of(code), nearest_reach_);
+    if (!nearest.found) no_value(code);
     const uint64_t found = morton_encode(static_cast<uint32_t>(nearest.cell[0]),
                                          static_cast<uint32_t>(nearest.cell[1]),
                                          static_cast<uint32_t>(nearest.cell[2]));
@@ -302,7 +305,7 @@ class CombinedColors {
     }
     uint64_t i = 0;
     const ColorRegion* const nearest =
-        has_nearest_ ? find_nearest_value(readers, code, i) : nullptr;
+        nearest_reach_ > 0 ? find_nearest_value(readers, code, i) : nullptr;
     if (nearest) return take(0, *nearest, i);
     none();
   }
@@ -353,7 +356,7 @@ class CombinedColors {
   const voxdag_reader::File& moved_b_;
   const DagView moved_b_dag_;
   const std::optional<voxdag_reader::Rgb> fill_;
-  const bool has_nearest_;
+  const uint32_t nearest_reach_;
   const CancelToken& cancel_;
   // A finest cell gets its value from the first source that has a value for it.
   std::vector<std::unique_ptr<AttributeSource>> sources_;

@@ -58,10 +58,11 @@ struct CombinedFiles {
   // Level of the finest cells of the result. Files must not have the attribute if their grid is
   // smaller than these cells.
   uint32_t levels = 0;
-  // If true, a cell in which no file has a value has the value of the nearest cell of A with the
+  // If not 0, a cell in which no file has a value has the value of the nearest cell of A with the
   // same edge in which A has a voxel. The distance is measured between centers; on ties, the cell
-  // with the lowest Morton code is used. A must have all attributes, and a voxel.
-  bool has_nearest = false;
+  // with the lowest Morton code is used. There must be such a cell at a distance of at most
+  // `nearest_reach` cells on each axis. A must have all attributes.
+  uint32_t nearest_reach = 0;
 };
 
 // Returns the level of the result whose cubes have the edge of the finest cells of an attribute of

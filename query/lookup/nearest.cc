@@ -1,6 +1,7 @@
 #include "query/lookup/nearest.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "core/geometry/morton.h"
 
@@ -15,10 +16,11 @@ class NearestSearch {
     best_.squared_distance = max_squared;
   }
 
-  Nearest run() {
-    const Position origin = {0, 0, 0};
-    if (!dag_.empty() && may_improve(origin, distance_to(origin, int64_t{1} << grid_levels_)))
-      enter(0, origin, dag_.root());
+  // Searches in a cube. `low` is its low corner.
+  Nearest run(uint32_t depth, const Position& low, uint64_t content) {
+    if (may_improve(low, distance_to(low, int64_t{1} << (grid_levels_ - depth))))
+      enter(depth, low, content);
+    if (!best_.found) best_.squared_distance = 0;
     return best_;
   }
 
@@ -32,13 +34,12 @@ class NearestSearch {
   // Returns the squared distance from the cell `from_` to the nearest cell of a cube. It is exact,
   // because the coordinates are integers.
   uint64_t distance_to(const Position& low, int64_t edge) const {
-    uint64_t squared = 0;
-    for (size_t axis = 0; axis < 3; ++axis) {
-      const int64_t d =
-          std::max({low[axis] - from_[axis], from_[axis] - (low[axis] + edge - 1), int64_t{0}});
-      squared += static_cast<uint64_t>(d) * static_cast<uint64_t>(d);
-    }
-    return squared;
+    return squared_on(0, low[0], edge) + squared_on(1, low[1], edge) + squared_on(2, low[2], edge);
+  }
+  // The part of one axis in distance_to().
+  uint64_t squared_on(size_t axis, int64_t low, int64_t edge) const {
+    const int64_t d = std::max({low - from_[axis], from_[axis] - (low + edge - 1), int64_t{0}});
+    return static_cast<uint64_t>(d) * static_cast<uint64_t>(d);
   }
   static uint64_t morton_of(const Position& p) {
     return morton_encode(static_cast<uint32_t>(p[0]), static_cast<uint32_t>(p[1]),
@@ -58,15 +59,19 @@ class NearestSearch {
     }
     const DagView::Children children = dag_.children(depth, content);
     const int64_t half = int64_t{1} << (grid_levels_ - depth - 1);
+    // For each axis, the part of the lower and of the upper children.
+    uint64_t squared[3][2];
+    for (size_t axis = 0; axis < 3; ++axis)
+      for (int upper = 0; upper < 2; ++upper)
+        squared[axis][upper] = squared_on(axis, low[axis] + upper * half, half);
     Child sorted[8];
     int count = 0;
     for (int i = 0; i < 8; ++i) {
-      if (!children.has(i)) continue;
-      Child child{
-          0,
-          i,
-          {low[0] + (i & 4 ? half : 0), low[1] + (i & 2 ? half : 0), low[2] + (i & 1 ? half : 0)}};
-      child.squared = distance_to(child.low, half);
+      const int x = i >> 2, y = i >> 1 & 1, z = i & 1;
+      const Child child{squared[0][x] + squared[1][y] + squared[2][z],
+                        i,
+                        {low[0] + x * half, low[1] + y * half, low[2] + z * half}};
+      if (!children.has(i) || child.squared > best_.squared_distance) continue;
       int at = count++;
       for (; at > 0 && sorted[at - 1].squared > child.squared; --at) sorted[at] = sorted[at - 1];
       sorted[at] = child;
@@ -88,9 +93,46 @@ class NearestSearch {
 
 Nearest find_nearest(const DagView& dag, uint32_t grid_levels, const Position& from,
                      uint64_t max_squared) {
-  Nearest nearest = NearestSearch(dag, grid_levels, from, max_squared).run();
-  if (!nearest.found) nearest.squared_distance = 0;
-  return nearest;
+  if (dag.empty()) return {};
+  return NearestSearch(dag, grid_levels, from, max_squared).run(0, {0, 0, 0}, dag.root());
+}
+
+Nearest NearestFinder::find(const Position& from, uint32_t reach) {
+  // The nearest cell is at a distance of at most sqrt(3) * reach, and so also on each axis. The
+  // cube contains all cells from `low` to `high` if their coordinates are equal in all but the last
+  // `shift` bits.
+  const int64_t margin = int64_t{7} * reach / 4;  // at least sqrt(3) * reach, rounded down
+  uint64_t different = 0;
+  for (const int64_t coordinate : from) {
+    const int64_t low = std::max<int64_t>(coordinate - margin, 0);
+    const int64_t high = std::min<int64_t>(coordinate + margin, (int64_t{1} << grid_levels_) - 1);
+    different |= static_cast<uint64_t>(low ^ high);
+  }
+  const uint32_t shift = static_cast<uint32_t>(std::bit_width(different));
+  const uint32_t depth = grid_levels_ - shift;
+  if (!descend(from, depth)) return {};
+  Position corner = from;
+  for (int64_t& coordinate : corner) coordinate = coordinate >> shift << shift;
+  return NearestSearch(dag_, grid_levels_, from, uint64_t{3} * reach * reach)
+      .run(depth, corner, contents_[depth]);
+}
+
+// Stores the contents of the cubes that contain the cell `to`, down to `depth`. Returns false if
+// one of these cubes has no cells.
+bool NearestFinder::descend(const Position& to, uint32_t depth) {
+  uint64_t different = 0;
+  for (size_t axis = 0; axis < 3; ++axis) different |= static_cast<uint64_t>(at_[axis] ^ to[axis]);
+  depth_ = std::min(depth_, grid_levels_ - static_cast<uint32_t>(std::bit_width(different)));
+  at_ = to;
+  for (; depth_ < depth; ++depth_) {
+    const DagView::Children children = dag_.children(depth_, contents_[depth_]);
+    const uint32_t shift = grid_levels_ - depth_ - 1;
+    const int index = static_cast<int>((to[0] >> shift & 1) << 2 | (to[1] >> shift & 1) << 1 |
+                                       (to[2] >> shift & 1));
+    if (!children.has(index)) return false;
+    contents_[depth_ + 1] = dag_.content(depth_, children, index);
+  }
+  return true;
 }
 
 }  // namespace voxdag::query

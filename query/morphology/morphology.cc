@@ -103,12 +103,16 @@ CombineReport change_by_cube(const voxdag_reader::File& a, const Morphology& mor
                                                : color_levels_of(a, name, a, attributes,
                                                                  spec.color_resolution, progress);
     const auto write_attributes = [&](const voxdag_reader::File& result, GlobalFileWriter& out) {
-      const CombinedFiles from{.result = result,
-                               .a = a,
-                               .b = a,
-                               .moved_b = a,
-                               .levels = levels,
-                               .has_nearest = !morphology.is_erosion};
+      const CombinedFiles from{
+          .result = result,
+          .a = a,
+          .b = a,
+          .moved_b = a,
+          .levels = levels,
+          .nearest_reach = morphology.is_erosion
+                               ? 0
+                               : static_cast<uint32_t>(
+                                     std::min(morphology.voxels, uint64_t{1} << kMaxGridLevels))};
       for (const CombinedAttribute& attribute : attributes)
         write_combined_attribute(from, attribute, work.files, out, work.budget, spec.threads,
                                  progress, cancel);
