@@ -64,7 +64,7 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
   if (g.resolution || !g.voxel_size) return spec;
   BuildSpec out = spec;
   // checked() accepts any valid value, and it also compares the radius with the resolution.
-  out.geometry.resolution = g.radius > 0 ? kMaxRadiusResolution : kMaxOptionEdge;
+  out.geometry.resolution = uint64_t{1} << max_levels_of(g);
   const BuildSpec full = checked(out);
   MemoryBudget budget(full.run.memory_bytes);
   const auto scene =
@@ -72,7 +72,8 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
   IngestState state;
   state.declared_triangles = scene->declared_triangles();
   scan(*scene, state, {context, full.run.threads, budget}, [] {});
-  const uint32_t levels = Grid::levels_for_voxel_size(state.bounds, *g.voxel_size);
+  const uint32_t levels =
+      Grid::levels_for_voxel_size(state.bounds, *g.voxel_size, max_levels_of(g));
   out.geometry.resolution = uint64_t{1} << levels;
   return out;
 }

@@ -1,6 +1,7 @@
 #include "core/geometry/grid.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -47,6 +48,23 @@ double largest_extent(const WorldBounds& bounds) {
                 "the extent of the scene is out of the range of doubles: expected coordinates "
                 "below 1e307");
   return extent;
+}
+
+// Returns a voxel size with which the scene fits in a grid of `levels` levels: the smallest size,
+// rounded up to six digits.
+std::string sufficient_voxel_size(double extent, uint32_t levels) {
+  const double least = extent / edge_of(1, levels);
+  // The last of six digits is 1e-6 to 1e-5 of the number.
+  for (const double factor : {1.0, 1 + 2e-6, 1 + 1e-5}) {
+    char text[40];
+    char* const end =
+        std::to_chars(text, text + sizeof text, least * factor, std::chars_format::general, 6).ptr;
+    double rounded = 0;
+    std::from_chars(text, end, rounded);
+    if (extent < edge_of(rounded, levels))
+      return std::string(text, static_cast<size_t>(end - text));
+  }
+  return number_text(std::nextafter(least, 2 * least));  // denormal numbers have fewer digits
 }
 
 // Two doubles in a vector register, which every supported processor has.
@@ -109,9 +127,10 @@ Grid Grid::given(const std::array<double, 3>& origin, double edge, uint32_t leve
   return {levels, origin, edge};
 }
 
-Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels) {
+Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels,
+                           uint32_t max_levels) {
   check_levels(levels);
-  const uint32_t least = levels_for_voxel_size(bounds, voxel_size);
+  const uint32_t least = levels_for_voxel_size(bounds, voxel_size, max_levels);
   if (levels < least)
     throw Error(ErrorCode::kInvalidInput,
                 "voxel size " + number_text(voxel_size) + ": the scene's largest extent " +
@@ -122,21 +141,21 @@ Grid Grid::with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_
   return centered(bounds, edge_of(voxel_size, levels), levels);
 }
 
-uint32_t Grid::levels_for_voxel_size(const WorldBounds& bounds, double voxel_size) {
+uint32_t Grid::levels_for_voxel_size(const WorldBounds& bounds, double voxel_size,
+                                     uint32_t max_levels) {
   if (!std::isfinite(voxel_size) || !(voxel_size > 0))
     throw Error(ErrorCode::kInvalidInput,
                 "voxel size " + number_text(voxel_size) + ": expected a finite number above 0");
   const double extent = largest_extent(bounds);
-  constexpr auto kMost = static_cast<uint32_t>(kMaxGridLevels);
   auto levels = static_cast<uint32_t>(kMinGridLevels);
   const auto fits = [&] { return extent == 0 || extent < edge_of(voxel_size, levels); };
-  while (levels < kMost && !fits()) ++levels;
+  while (levels < max_levels && !fits()) ++levels;
   if (!fits())
     throw Error(ErrorCode::kInvalidInput,
                 "voxel size " + number_text(voxel_size) + ": the scene's largest extent " +
-                    number_text(extent) + " does not fit in 2^" + std::to_string(kMost) +
-                    " voxels: expected a voxel size above " +
-                    number_text(extent / edge_of(1, kMost)));
+                    number_text(extent) + " does not fit in 2^" + std::to_string(max_levels) +
+                    " voxels: expected a voxel size of at least " +
+                    sufficient_voxel_size(extent, max_levels));
   return levels;
 }
 

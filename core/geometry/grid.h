@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/geometry/cube.h"
 #include "core/geometry/fixed_triangle.h"
 
 namespace voxdag {
@@ -55,11 +56,15 @@ struct Grid {
   static Grid given(const std::array<double, 3>& origin, double edge, uint32_t levels);
   // Returns the grid whose voxels have the edge `voxel_size` and whose center is the scene's
   // center. Throws Error{kInvalidInput} if the scene does not fit in this grid, or if the size or
-  // the levels are invalid, and Error{kLimit} if the grid is not finite.
-  static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels);
+  // the levels are invalid, and Error{kLimit} if the grid is not finite. The error recommends only
+  // grids of at most `max_levels` levels.
+  static Grid with_voxel_size(const WorldBounds& bounds, double voxel_size, uint32_t levels,
+                              uint32_t max_levels = kMaxGridLevels);
   // Returns the smallest number of levels with which a grid of voxels of this edge contains the
-  // scene. Throws Error{kInvalidInput} if the scene fits in no grid, or if the size is invalid.
-  static uint32_t levels_for_voxel_size(const WorldBounds& bounds, double voxel_size);
+  // scene. Throws Error{kInvalidInput} if the scene fits in no grid of at most `max_levels` levels,
+  // or if the size is invalid.
+  static uint32_t levels_for_voxel_size(const WorldBounds& bounds, double voxel_size,
+                                        uint32_t max_levels = kMaxGridLevels);
 };
 
 enum class SnapResult {

@@ -75,6 +75,11 @@ inline SolidRule solid_rule_of(const GeometryOptions& options) {
 // resolution (stages/enclose/cube_walks.h), which can have at most kMaxGridLevels levels.
 inline constexpr uint64_t kMaxRadiusResolution = uint64_t{1} << (kMaxGridLevels - 1);
 
+// Returns the maximum number of levels of the grid of a build with these options.
+inline uint32_t max_levels_of(const GeometryOptions& options) {
+  return static_cast<uint32_t>(options.radius > 0 ? kMaxGridLevels - 1 : kMaxGridLevels);
+}
+
 // Returns the geometry options as one line of JSON, for comparing jobs and for messages. Scenes are
 // left out because only their content matters.
 std::string geometry_json(const GeometryOptions& options);

@@ -213,7 +213,8 @@ Grid choose_grid(const GeometryOptions& options, const WorldBounds& bounds) {
     const auto& b = *options.bounds;
     return Grid::given({b[0], b[1], b[2]}, b[3], levels);
   }
-  if (options.voxel_size) return Grid::with_voxel_size(bounds, *options.voxel_size, levels);
+  if (options.voxel_size)
+    return Grid::with_voxel_size(bounds, *options.voxel_size, levels, max_levels_of(options));
   return Grid::around(bounds, levels);
 }
 

@@ -144,6 +144,27 @@ TEST(Grid, OfAVoxelSize) {
     expect_error(ErrorCode::kInvalidInput, [&] { Grid::with_voxel_size(b, size, 4); });
 }
 
+// If no grid is fine enough, the error recommends a voxel size with which the scene fits, also if
+// the number of levels has a lower limit.
+TEST(Grid, RecommendsASufficientVoxelSize) {
+  for (const uint32_t max_levels : {20u, 19u})
+    for (const double extent :
+         {1.0, 11.0, 2000010.0, 0.1, 3.0, 9.999999, 1e-3, 1e300, 1e-300, 5e-310}) {
+      const WorldBounds b = bounds({0, 0, 0}, {extent, 0, 0});
+      const double size = extent / 1e7;
+      const std::string message =
+          error_of([&] { Grid::levels_for_voxel_size(b, size, max_levels); }).message();
+      const std::string head = "expected a voxel size of at least ";
+      ASSERT_NE(message.find(head), std::string::npos) << message;
+      EXPECT_NE(message.find("2^" + std::to_string(max_levels)), std::string::npos) << message;
+      const double recommended =
+          std::strtod(message.substr(message.find(head) + head.size()).c_str(), nullptr);
+      EXPECT_EQ(Grid::levels_for_voxel_size(b, recommended, max_levels), max_levels) << message;
+      EXPECT_EQ(error_of([&] { Grid::with_voxel_size(b, size, 10, max_levels); }).message(),
+                message);
+    }
+}
+
 // A grid whose origin or edge is not finite is refused, because no command could open its file. An
 // earlier version wrote such files.
 TEST(GridLimits, AGridOutOfTheRangeOfDoublesIsRefused) {
