@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include "core/base/options/option_text.h"
+#include "core/base/text.h"
 #include "core/fields/field.h"
 #include "core/io/outputs/space_reserve.h"
 #include "core/io/temporary_paths.h"
@@ -20,6 +22,25 @@ void warn_of_empty_scene(const BuildSpec& spec, const IngestState& state, Progre
   progress.warn_of_input(
       {"empty-scene", joined(spec.geometry.scenes),
        reason + (spec.run.allow_empty ? "; the file will have no nodes" : "; a build refuses it")});
+}
+
+// Throws Error if a build would refuse the seed.
+void check_seed(const GeometryOptions& options, const PreparedScene& scene,
+                const CancelToken& cancel) {
+  const auto seed = seed_of(options, scene.state.grid);
+  if (!seed) return;
+  const auto triangles = scene.triangles->open(kSceneBin);
+  if (is_in_shell(*seed, scene.state.grid.levels, *triangles, cancel)) refuse_seed_in_shell(*seed);
+}
+
+// Throws Error for a plan without builds at coarse resolutions, from which it would extrapolate.
+[[noreturn]] void refuse_memory(const RunOptions& run, const Estimate& estimate) {
+  throw Error(ErrorCode::kOutOfMemory,
+              "the memory budget of " + size_text(run.memory_bytes) +
+                  " is too small for an estimate, which builds the scene of " +
+                  count_text(estimate.triangles) +
+                  " triangles at coarse resolutions in memory: expected a larger " +
+                  option_text("memory"));
 }
 
 }  // namespace
@@ -47,8 +68,9 @@ Estimate plan_build(const BuildSpec& spec, const BuildContext& caller) {
   } cleanup{work, full.run.work_folder.empty()};
   IngestCheckpoint no_checkpoints(full, nullptr, work, context);
   const PreparedScene scene = prepare_scene(full, source, budget, clock, context, no_checkpoints);
-  seed_of(full.geometry, scene.state.grid);  // throws for a point outside the grid
+  check_seed(full.geometry, scene, context.cancel);
   Estimate estimate = estimate_build(full, scene, source, {context, full.run.threads, budget});
+  if (estimate.pilot_resolution == 0) refuse_memory(full.run, estimate);
   if (scene.state.counts.triangles == 0) warn_of_empty_scene(full, scene.state, context.progress);
   if (estimate.solid && estimate.solid->warning)
     context.progress.warn_of_input(*estimate.solid->warning);

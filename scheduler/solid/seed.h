@@ -6,10 +6,12 @@
 #include <optional>
 #include <string>
 
+#include "core/backend/backend.h"
 #include "core/dag/space/seed_place.h"
 #include "core/geometry/cube.h"
 #include "core/geometry/grid.h"
 #include "scheduler/spec/build_spec.h"
+#include "voxdag/cancel_token.h"
 
 namespace voxdag {
 
@@ -32,6 +34,12 @@ std::optional<CubeVoxel> seed_in(const std::optional<Seed>& seed, const Cube& cu
 // down) along each axis of the walking cube is the seed's voxel. The position is in the grid of the
 // positions. `radius` is V, and `grid_levels` are the levels of the grid of the voxels.
 CubeVoxel start_position(const Seed& seed, uint32_t radius, uint32_t grid_levels);
+
+// Returns true if a triangle touches the seed's voxel or, in a build with a radius, a voxel of the
+// walking cube at its start position. A build then throws the error of refuse_seed_in_shell().
+// `triangles` are all triangles of the scene, on the build's grid.
+bool is_in_shell(const Seed& seed, uint32_t grid_levels, TriangleStream& triangles,
+                 const CancelToken& cancel);
 
 // Throws UnbuildableJob{kInvalidInput} with the message that a triangle touches the seed's voxel
 // or, in a build with a radius, a voxel of the walking cube at its start position.

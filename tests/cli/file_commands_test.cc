@@ -232,6 +232,14 @@ TEST_F(FileCommands, PlanNames) {
   }
 }
 
+// A plan extrapolates from builds at coarse resolutions. If none of them fits in memory, there is
+// no estimate.
+TEST_F(FileCommands, PlanWithTooLittleMemory) {
+  ASSERT_EQ(run({"generate", "soup", "soup.glb", "--triangles", "400000"}).status, 0);
+  expect_error(8, "too small for an estimate, which builds the scene of 400 000 triangles",
+               {"plan", "soup.glb", "-r", "32k", "--memory", "64MiB", "-q"});
+}
+
 // The plan of a solid estimates the number of voxels in its interior. It also has the warnings
 // about the surface, which come from a build on a coarser grid (the pilot).
 TEST_F(FileCommands, PlanOfASolid) {

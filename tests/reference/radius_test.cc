@@ -2,6 +2,7 @@
 #include <array>
 
 #include "core/base/error.h"
+#include "scheduler/plan_build.h"
 #include "tests/oracle/solid/solids.h"
 #include "tests/oracle/solid/walks.h"
 #include "tests/oracle/voxels.h"
@@ -22,6 +23,11 @@ class Radius : public Reference {
     spec.geometry.solid = SolidName::kEnclosed;
     spec.geometry.radius = static_cast<uint32_t>(radius);
     return spec;
+  }
+  void plan(const BuildSpec& spec) {
+    voxdag::NoProgress progress;
+    const voxdag::CancelToken never;
+    voxdag::plan_build(spec, {voxdag::system_files(), progress, never});
   }
   // Builds the solid and compares it with the oracle's.
   void expect_sealed(oracle::SolidKind kind, int edge, int radius) {
@@ -129,8 +135,10 @@ TEST_F(Radius, SeedsEqualTheOracle) {
           const voxdag::Error error = voxdag::error_of([&] { run(spec); });
           EXPECT_EQ(error.code(), voxdag::ErrorCode::kInvalidInput);
           EXPECT_NE(error.message().find("farther from surfaces"), std::string::npos);
+          EXPECT_EQ(voxdag::error_of([&] { plan(spec); }).message(), error.message());
           continue;
         }
+        plan(spec);
         const BuildReport report = run(spec);
         expect_file_equals(report.output, truth->voxels, 64);
         EXPECT_EQ(report.solid->interior, truth->voxels.count() - shell.count());

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "core/base/error.h"
+#include "scheduler/plan_build.h"
 #include "tests/oracle/solid/solids.h"
 #include "tests/oracle/voxels.h"
 #include "tests/reference/reference_build.h"
@@ -45,10 +46,17 @@ class Seeds : public Reference {
     spec.geometry.seed = {seed[0] + 0.5, seed[1] + 0.5, seed[2] + 0.5};
     return spec;
   }
+  // Returns the message with which both the build and its plan refuse the seed.
   std::string refusal(const BuildSpec& spec) {
     const voxdag::Error error = voxdag::error_of([&] { run(spec); });
     EXPECT_EQ(error.code(), voxdag::ErrorCode::kInvalidInput);
+    EXPECT_EQ(voxdag::error_of([&] { plan(spec); }).message(), error.message());
     return error.message();
+  }
+  void plan(const BuildSpec& spec) {
+    voxdag::NoProgress progress;
+    const voxdag::CancelToken never;
+    voxdag::plan_build(spec, {voxdag::system_files(), progress, never});
   }
 };
 
@@ -71,6 +79,7 @@ TEST_F(Seeds, EqualTheOracle) {
         }
         oracle::Voxels expected = shell;
         const bool is_enclosed = fill_from(seed, expected);
+        plan(spec);
         const BuildReport report = run(spec);
         expect_file_equals(report.output, expected, 64);
         EXPECT_EQ(report.solid->interior, expected.count() - shell.count());

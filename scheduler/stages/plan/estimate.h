@@ -37,8 +37,8 @@ struct SolidEstimate {
 struct Estimate {
   uint64_t triangles = 0;
   uint64_t subvolumes = 0;
-  double expected_bricks = 0;  // sum of the expected bricks of each triangle
-  uint64_t pilot_resolution = 0;
+  double expected_bricks = 0;     // sum of the expected bricks of each triangle
+  uint64_t pilot_resolution = 0;  // 0: no pilot fits in memory, so only the voxels are estimated
   EstimateRange voxels, svo_nodes, dag_nodes;
   EstimateRange file_bytes;    // size of the global file
   EstimateRange disk_bytes;    // peak use, including spilled triangles, artifacts and the file
