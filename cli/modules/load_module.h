@@ -9,7 +9,8 @@ namespace voxdag::cli {
 
 // Loads the library "voxdag-<name>.so" from the folder of modules. Returns the address of its table
 // "voxdag_<name>_module", which begins with a ModuleHead. The library remains loaded. Throws
-// Error{kInvalidInput} if the library cannot be loaded, or if it has another version.
+// Error{kIo} if the library cannot be loaded, or if it has another version. The user's input is not
+// the cause of these errors.
 const void* load_module(const std::string& name);
 
 // Returns a module's table. Loads the module at the first call.
