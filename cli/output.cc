@@ -62,10 +62,7 @@ void OutputFile::guard(GuardedOutputs& files) const {
 void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const {
   check(files, path, input, is_own);
   check(files, path + ".partial", input, is_own);
-  const std::string folder = parent_directory(path);
-  if (!files.exists(folder))
-    throw Error(ErrorCode::kNotFound,
-                path + ": the folder " + folder + " does not exist: expected an existing folder");
+  expect_parent_folder(files, path);
 }
 
 void OutputFile::check(FileSystem& files, const std::string& name, const std::string& input,

@@ -5,6 +5,7 @@
 #include "client/retry_policy.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
+#include "core/io/overwrite.h"
 
 namespace voxdag::client {
 namespace {
@@ -25,7 +26,7 @@ class Download {
         partial_(output + "." + sha256_.substr(0, kDigitsInPartialName) + ".partial") {}
 
   DownloadResult run() {
-    files_.make_directories(parent_directory(output_));
+    expect_parent_folder(files_, output_);
     const uint64_t resumed_bytes = bytes_present();
     if (size_ == 0) files_.create(partial_)->close();
     for (RetryPolicy retry(service_.cancel()); bytes_present() < size_;) {

@@ -10,6 +10,7 @@
 #include "core/base/text/printable.h"
 #include "core/fields/json_fields.h"
 #include "core/format/global/global_writer.h"
+#include "core/io/overwrite.h"
 #include "server/jobs/protocol/export_spec.h"
 
 namespace voxdag::cli {
@@ -90,6 +91,7 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
   const auto progress = make_progress_bar(command.quiet);
   if (is_export) return download_export(command, service, files, paths, *progress);
   const client::DownloadResult result = client::download_result(
+    expect_parent_folder(files, path);
       service, files, service.job(command.id), command.output.path, *progress);
   if (command.json)
     print_json(file_json(command.output.path, result));

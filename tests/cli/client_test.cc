@@ -88,6 +88,8 @@ TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   const std::string id = job["id"];
   const Json report = run_json({"download", id, "-o", "out/got.vdag"});
   EXPECT_EQ(report["resumed_bytes"], 0);
+  expect_error(3, "the folder out does not exist", {"download", id, "-o", "out/got.vdag"});
+  std::filesystem::create_directory(folder_.file("out"));
   EXPECT_EQ(report["sha256"], job["result"]["sha256"]);
   EXPECT_EQ(report["bytes"], contents("out/got.vdag").size());
   EXPECT_EQ(run({"verify", "out/got.vdag", "--against", "m.glb"}).status, 0);

@@ -10,6 +10,7 @@
 #include "core/base/options/option_text.h"
 #include "core/fields/json_text.h"
 #include "core/format/checksum.h"
+#include "core/io/overwrite.h"
 #include "query/export/dag_export.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
@@ -92,6 +93,7 @@ void check_chunks(const ChunksRequest& request) {
 }
 
 void check_folder(FileSystem& files, const ExportRequest& request) {
+  expect_parent_folder(files, request.output);
   if (!files.exists(request.output) || request.replace || files.list(request.output).empty())
     return;
   throw Error(ErrorCode::kInvalidInput, request.output +
@@ -182,11 +184,9 @@ class ChunkWriter {
     } catch (const Error&) {
     }
   }
-  // Makes a folder and its missing parents.
   void make_folder(const std::string& path) {
     if (files_.exists(path)) return;
-    make_folder(parent_directory(path));
-    files_.make_directories(path);
+    files_.make_directory(path);
     folders_.push_back(path);
   }
   std::array<double, 6> world_box(const Selection& selection) const {
