@@ -55,6 +55,9 @@ void download_export(const DownloadCommand& command, ServiceClient& service, Fil
                 "the export of the server has " + std::to_string(remote.size()) +
                     " files: expected " + std::to_string(paths.size()) + " for the format " +
                     command.spec.to);
+  // Exports of services before this member existed have their warnings in the notes.
+  const Json warnings = exported.value("warnings", Json::array());
+  for (const Json& warning : warnings) progress.warn(warning.get<std::string>());
   Json done = Json::array();
   for (size_t i = 0; i < remote.size(); ++i) {
     const auto result = client::download_file(service, files, remote[i], paths[i], progress);
@@ -66,7 +69,8 @@ void download_export(const DownloadCommand& command, ServiceClient& service, Fil
                            {"format", command.spec.to},
                            {"files", done},
                            {"voxels", exported.at("voxels")},
-                           {"notes", exported.at("notes")}});
+                           {"notes", exported.at("notes")},
+                           {"warnings", warnings}});
   if (command.quiet) return;
   for (const Json& note : exported.at("notes"))
     std::printf("  %s\n", printable_line(note.get<std::string>()).c_str());
@@ -87,11 +91,11 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
     const OutputFile output{path, command.output.force};
     output.guard(files);
     output.check(files, path, "", is_own);
+    expect_parent_folder(files, path);
   }
   const auto progress = make_progress_bar(command.quiet);
   if (is_export) return download_export(command, service, files, paths, *progress);
   const client::DownloadResult result = client::download_result(
-    expect_parent_folder(files, path);
       service, files, service.job(command.id), command.output.path, *progress);
   if (command.json)
     print_json(file_json(command.output.path, result));

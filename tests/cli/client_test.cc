@@ -310,6 +310,20 @@ TEST_F(Client, DownloadsExports) {
   expect_error(2, "--up", {"download", id, "--to", "ply", "--up", "x", "-o", "x.ply"});
 }
 
+  // Warnings are printed also with --quiet. The middle of the sponge is empty.
+  const std::vector<std::string> empty = {
+      "download", id, "--to", "vdag", "--region", "30,30,30,34,34,34", "-o", "empty.vdag"};
+  const std::string warning = "the selection has no voxels: the file will have no nodes";
+  std::vector<std::string> quiet = empty;
+  quiet.push_back("-q");
+  const Answer answer = run(quiet);
+  EXPECT_EQ(answer.status, 0);
+  EXPECT_EQ(answer.out, "");
+  EXPECT_EQ(answer.err, "voxdag: warning: " + warning + "\n");
+  EXPECT_EQ(run_json(empty)["warnings"], Json({warning}));
+  const std::string of_empty = run_json({"exports", id})["exports"][3]["id"];
+  ASSERT_EQ(run({"exports", id, "--delete", of_empty}).status, 0);
+
 // Jobs that wait in the queue behind a long job can be suspended, canceled and resumed.
 TEST_F(Client, SuspendsCancelsAndResumes) {
   const std::string first = submit_long();

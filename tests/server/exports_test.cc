@@ -142,9 +142,41 @@ TEST_F(ServiceExports, HaveTheWarningsOfLocalExtracts) {
   };
   const Json empty = extract({30, 30, 30, 34, 34, 34});
   EXPECT_EQ(empty["voxels"], 0) << empty;
-  EXPECT_EQ(empty["notes"],
+  EXPECT_EQ(empty["warnings"],
             Json::array({"the selection has no voxels: the file will have no nodes"}));
-  EXPECT_EQ(extract({0, 0, 0, 64, 64, 64})["notes"], Json::array());
+  EXPECT_EQ(empty["notes"], Json::array());
+  EXPECT_EQ(extract({0, 0, 0, 64, 64, 64})["warnings"], Json::array());
+}
+
+// If files were removed from the service's disk, the advice depends on the removed file. A new job
+// is not needed for an export whose result still exists.
+TEST_F(ServiceExports, AdviseWhatToDoAboutRemovedFiles) {
+  start();
+  const std::string id = finished_job();
+  const Json request = {{"to", "npz"}, {"level", 5}};
+  const std::string path = queued_export(id, request);
+  const Json done = ended(path);
+  const std::string file = done["files"][0]["href"];
+  std::filesystem::remove(folder_of(path) + "/" + done["files"][0]["name"].get<std::string>());
+  const ClientResponse removed = http_->get(file);
+  EXPECT_EQ(removed.status, 404);
+  EXPECT_NE(removed.body.find("; delete the export and request it again"), std::string::npos)
+      << removed.body;
+  EXPECT_EQ(removed.body.find("new job"), std::string::npos) << removed.body;
+  // The advice works.
+  EXPECT_EQ(http_->send("DELETE", path, "").status, 204);
+  const Json again = ended(queued_export(id, request));
+  EXPECT_EQ(http_->get(again["files"][0]["href"]).status, 200) << again;
+
+  std::filesystem::remove(config_.data_folder + "/jobs/" + id + "/result.vdag");
+  for (const ClientResponse& response :
+       {http_->get("/api/v1/jobs/" + id + "/dag"), post(exports_of(id), {{"to", "glb"}})}) {
+    EXPECT_EQ(response.status, 404);
+    EXPECT_NE(response.body.find("the result of the job " + id + " was removed"), std::string::npos)
+        << response.body;
+    EXPECT_NE(response.body.find("; submit a new job of the scene"), std::string::npos)
+        << response.body;
+  }
 }
 
 TEST_F(ServiceExports, RefuseWrongRequests) {

@@ -42,6 +42,7 @@ std::string export_json(const Export& it, const LiveJob* live) {
                     : ordered_json{{"code", it.error_code}, {"message", it.error_message}}},
       {"voxels", has_result ? ordered_json(it.result.voxels) : ordered_json()},
       {"notes", has_result ? it.result.notes : std::vector<std::string>()},
+      {"warnings", has_result ? it.result.warnings : std::vector<std::string>()},
       {"files", std::move(files)},
       {"links", {{"self", self}}}};
   make_printable(json);

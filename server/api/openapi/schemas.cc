@@ -206,6 +206,7 @@ void add_exports(Json& all) {
                           {"error", error},
                           {"voxels", or_null("integer")},
                           {"notes", array(text())},
+                          {"warnings", array(text())},
                           {"files", array(named("ExportedFile"))},
                           {"links", map_of(text())}});
   all["ExportList"] = object({{"exports", array(named("Export"))}});

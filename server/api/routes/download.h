@@ -15,18 +15,23 @@ namespace voxdag::server {
 // Returns the job with the id of the call. Throws Problem (404) unless it has succeeded.
 Job finished_job(Context& context, Call& call);
 
-// Returns open(), which opens a file of a job that has succeeded. Throws Problem (404) with the id
-// of the job and `file`, a description of the file, if the file was removed from the service's
-// disk.
+// Advice of open_kept() for files that only a new job can make.
+inline constexpr const char* kNewJobAdvice = "submit a new job of the scene";
+
+// Returns open(), which opens a file of a job that has succeeded. Throws Problem (404) if the file
+// was removed from the service's disk. The problem names the job and `file`, a description of the
+// file, and gives `advice` on how to get such a file.
 template <class Open>
-auto open_kept(const std::string& job, const std::string& file, const Open& open) {
+auto open_kept(const std::string& job, const std::string& file, const char* advice,
+               const Open& open) {
   try {
     return open();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kNotFound) throw;
     throw not_found(file + " of the job " + job +
                     " was removed from the disk of the service: expected it to remain until it is "
-                    "deleted by a request; submit a new job of the scene");
+                    "deleted by a request; " +
+                    advice);
   }
 }
 // Returns the beginning of the file name of a download, NAME-RESOLUTION. NAME is the name of the

@@ -42,7 +42,9 @@ Response post_export(Context& context, Call& call) {
   const ExportSpec spec = parse_export_spec(body);
   const Job job = finished_job(context, call);
   if (context.draining) throw busy("the service is stopping: expected a request after its restart");
-  const auto file = open_global_file(context.dispatcher.folder(job.id).result());
+  const auto file = open_kept(job.id, "the result", kNewJobAdvice, [&] {
+    return open_global_file(context.dispatcher.folder(job.id).result());
+  });
   const uint64_t resolution = uint64_t{1} << selection_of(spec, *file).grid_levels;
   const std::string stem = download_stem(job, resolution) + (spec.region ? "-part" : "");
   expect_disk_space(context);
@@ -92,9 +94,11 @@ Response get_export_file(Context& context, Call& call) {
     throw not_found("the export has no file '" + printable(call.names[2]) +
                     "': expected a number from 0 to " + std::to_string(it.result.files.size() - 1));
   const ExportedFile& file = it.result.files[(*number)[0]];
-  auto opened = open_kept(it.job, "the file " + file.name + " of the export " + it.id, [&] {
-    return context.files.open_own(context.dispatcher.exports().path(it, file.name));
-  });
+  // The same request returns the existing export until a request deletes it.
+  auto opened = open_kept(
+      it.job, "the file " + file.name + " of the export " + it.id,
+      "delete the export and request it again",
+      [&] { return context.files.open_own(context.dispatcher.exports().path(it, file.name)); });
   return download(context, call, std::move(opened), file.sha256, file.name);
 }
 

@@ -27,7 +27,7 @@ Response get_dag(Context& context, Call& call) {
   const auto open = [&] {
     return context.files.open_own(context.dispatcher.folder(job.id).result());
   };
-  return download(context, call, open_kept(job.id, "the result", open),
+  return download(context, call, open_kept(job.id, "the result", kNewJobAdvice, open),
                   parse_json<nlohmann::json>(job.result).at("sha256"), file_name(job));
 }
 
@@ -41,10 +41,11 @@ Response stream_file(Context& context, const std::string& path, Response respons
 Response get_report(Context& context, Call& call) {
   auto permit = context.answers.wait();
   const Job job = finished_job(context, call);
-  auto report = parse_json<nlohmann::ordered_json>(open_kept(job.id, "the report", [&] {
-    return read_own_file(context.files, context.dispatcher.folder(job.id).report(),
-                         kMaxSentReportBytes);
-  }));
+  auto report =
+      parse_json<nlohmann::ordered_json>(open_kept(job.id, "the report", kNewJobAdvice, [&] {
+        return read_own_file(context.files, context.dispatcher.folder(job.id).report(),
+                             kMaxSentReportBytes);
+      }));
   report["output"] = file_name(job);
   make_printable(report);
   Response response = json_response(200, json_text(report));
@@ -60,7 +61,7 @@ Response get_preview(Context& context, Call& call) {
         job.preview == Preview::kFailed
             ? "the preview could not be rendered: expected a file that voxdag render can render"
             : "the preview is not rendered yet: expected a request later");
-  return open_kept(job.id, "the preview", [&] {
+  return open_kept(job.id, "the preview", "render the downloaded result instead", [&] {
     return stream_file(context, path, make_response(200, "image/png", "private, max-age=3600"));
   });
 }

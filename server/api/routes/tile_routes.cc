@@ -274,7 +274,7 @@ TileAccess open_result(Context& context, const Call& call) {
     throw problem;
   }
   auto permit = tile_permit(context, call);
-  auto file = open_kept(job.id, "the result", [&] {
+  auto file = open_kept(job.id, "the result", kNewJobAdvice, [&] {
     return context.open_sources.open(context.dispatcher.folder(job.id).result());
   });
   return {std::move(file), std::move(permit)};

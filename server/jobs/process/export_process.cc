@@ -26,7 +26,7 @@ ExportResult write_vdag(FileSystem& files, const voxdag_reader::File& file, cons
   extract.memory_bytes = task.memory_bytes;
   extract.threads = task.threads ? task.threads : default_threads();
   const query::ExtractReport report = query::extract(file, extract, files, progress, cancel);
-  return {{{task.output, report.bytes, report.sha256}}, report.voxels, report.warnings};
+  return {{{task.output, report.bytes, report.sha256}}, report.voxels, {}, report.warnings};
 }
 
 ExportResult write_format(FileSystem& files, const voxdag_reader::File& file, const JobTask& task,
@@ -40,7 +40,7 @@ ExportResult write_format(FileSystem& files, const voxdag_reader::File& file, co
   request.replace = true;
   request.options = spec.options;
   const query::ExportReport report = query::export_dag(files, file, request, progress, cancel);
-  ExportResult result{{}, report.voxels, report.notes};
+  ExportResult result{{}, report.voxels, report.notes, {}};
   progress.begin_stage("checksum", report.bytes, "bytes");
   for (const std::string& path : report.files) {
     const auto written = files.open_read(path);

@@ -37,13 +37,15 @@ void fields(Visitor& visit, ExportedFile& file) {
 struct ExportResult {
   std::vector<ExportedFile> files;
   uint64_t voxels = 0;
-  std::vector<std::string> notes;  // usage notes for the files, and warnings
+  std::vector<std::string> notes;     // usage notes for the files, one sentence each
+  std::vector<std::string> warnings;  // one sentence each
 };
 template <class Visitor>
 void fields(Visitor& visit, ExportResult& result) {
   visit("files", result.files);
   visit("voxels", result.voxels);
   visit("notes", result.notes);
+  visit(Field("warnings").omit_empty(), result.warnings);
 }
 
 struct Export {

@@ -120,6 +120,7 @@ export class ExportsView {
           h("div", {class: "export-row"}, h("strong", {}, name), stateBadge(it.state), stage),
           may("queued", "running") && bar.element,
           it.error && problemBox({code: it.error.code, detail: it.error.message}),
+          it.warnings.map((warning) => h("p", {}, `Warning: ${warning}`)),
           it.notes.map((note) => h("p", {class: "faint"}, note)),
           h("div", {class: "buttons"},
             it.files.map(
