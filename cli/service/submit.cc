@@ -10,6 +10,7 @@
 #include "core/base/text/printable.h"
 #include "core/fields/json_fields.h"
 #include "core/io/random_id.h"
+#include "scheduler/check_spec.h"
 #include "server/jobs/protocol/job_request.h"
 
 namespace voxdag::cli {
@@ -35,6 +36,27 @@ std::vector<std::string> upload(const std::vector<std::string>& scenes, FileSyst
   return names;
 }
 
+// Without --resolution, finds the resolution for --voxel-size, as `build` does. Reads the scene on
+// this machine, so all of its files must be local.
+void find_resolution(server::JobRequest& request, CommandContext& context, bool quiet) {
+  GeometryOptions& geometry = request.spec.geometry;
+  if (geometry.resolution > 0) return;
+  // Run options of the request, such as --memory, are for the server.
+  BuildSpec local{geometry, {}};
+  local.geometry.scenes = request.scenes;
+  for (const std::string& scene : request.scenes)
+    if (geometry.voxel_size && !context.files.exists(scene))
+      throw Error(
+          ErrorCode::kInvalidInput,
+          "--voxel-size was given without --resolution: expected both, because the scene '" +
+              scene + "' is not on this machine, so this command cannot find its extent");
+  const auto progress = make_progress_bar(quiet);
+  geometry.resolution = with_option_names([&] {
+    return checked(with_resolution(local, {context.files, *progress, context.cancel}))
+        .geometry.resolution;
+  });
+}
+
 // Throws before the upload if the server would refuse the labels.
 void check_labels(const std::vector<std::string>& labels) {
   if (labels.empty() || fits(server::kLabelsField, labels)) return;
@@ -53,6 +75,7 @@ void check_labels(const std::vector<std::string>& labels) {
 void run(const SubmitCommand& command, ServiceClient& service, CommandContext& context) {
   server::JobRequest request = command.request;
   check_labels(request.labels);
+  find_resolution(request, context, command.quiet);
   request.scenes = upload(request.scenes, context.files, service, command.quiet);
   const Json body = options_json(request);
   // Idempotency key: if the answer is lost and the request is sent again, the server creates no
@@ -73,6 +96,7 @@ void run(const SubmitCommand& command, ServiceClient& service, CommandContext& c
 void declare(Command& command, SubmitCommand& state) {
   OptionDeclarer options(command, Scope::kSubmit);
   fields(options, state.request);
+  options.at("resolution").optional();  // --voxel-size can replace it
   command.config_option();
   state.service.declare(command);
   command.flag("--wait", state.wait, "follow the job until it ends, as watch does");

@@ -20,6 +20,8 @@
 namespace command_line {
 namespace {
 
+using namespace std::string_literals;
+
 class Client : public CommandLine {
  protected:
   void SetUp() override {
@@ -86,10 +88,10 @@ TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
   EXPECT_EQ(job["name"], "sponge");
   EXPECT_EQ(job["options"]["hash_bits"], 16);
   const std::string id = job["id"];
-  const Json report = run_json({"download", id, "-o", "out/got.vdag"});
-  EXPECT_EQ(report["resumed_bytes"], 0);
   expect_error(3, "the folder out does not exist", {"download", id, "-o", "out/got.vdag"});
   std::filesystem::create_directory(folder_.file("out"));
+  const Json report = run_json({"download", id, "-o", "out/got.vdag"});
+  EXPECT_EQ(report["resumed_bytes"], 0);
   EXPECT_EQ(report["sha256"], job["result"]["sha256"]);
   EXPECT_EQ(report["bytes"], contents("out/got.vdag").size());
   EXPECT_EQ(run({"verify", "out/got.vdag", "--against", "m.glb"}).status, 0);
@@ -115,6 +117,23 @@ TEST_F(Client, BuildsTheSameBytesAsTheBuildCommand) {
     EXPECT_EQ(answer.out + answer.err, "") << quiet[0];
   }
   EXPECT_NE(watched.out.find(report["sha256"].get<std::string>()), std::string::npos);
+}
+
+// Without -r, `submit` finds the resolution for --voxel-size, as `build` does. It cannot do this
+// for a scene that is not on this machine.
+TEST_F(Client, FindsTheResolutionForAVoxelSize) {
+  for (const std::string& voxel_size : {"0.013"s, "0.3"s}) {
+    const Json job = run_json({"submit", "m.glb", "--voxel-size", voxel_size, "--wait"});
+    const Json built = run_json({"build", "m.glb", "--voxel-size", voxel_size, "-o", "m.vdag"});
+    EXPECT_EQ(job["resolution"], built["resolution"]);
+    EXPECT_EQ(job["result"]["sha256"], built["sha256"]);
+  }
+  const std::string uploaded = run_json({"jobs"})["jobs"][0]["scene"][0];
+  expect_error(2, "the scene '" + uploaded + "' is not on this machine",
+               {"submit", uploaded, "--voxel-size", "0.3"});
+  expect_error(2, "or a voxel size instead", {"submit", "m.glb"});
+  expect_error(2, "expected a voxel size of at least", {"submit", "m.glb", "--voxel-size", "1e-9"});
+  EXPECT_EQ(run_json({"jobs"})["jobs"].size(), 2u);
 }
 
 // `submit --label` labels a job, and `jobs` finds jobs by a label or by a part of it. Invalid
@@ -291,6 +310,20 @@ TEST_F(Client, DownloadsExports) {
   ASSERT_EQ(run({"extract", "m.vdag", "--level", "4", "-o", "local.vdag"}).status, 0);
   EXPECT_TRUE(contents("coarse.vdag") == contents("local.vdag"));
 
+  // Warnings are printed also with --quiet. The middle of the sponge is empty.
+  const std::vector<std::string> empty = {
+      "download", id, "--to", "vdag", "--region", "30,30,30,34,34,34", "-o", "empty.vdag"};
+  const std::string warning = "the selection has no voxels: the file will have no nodes";
+  std::vector<std::string> quiet = empty;
+  quiet.push_back("-q");
+  const Answer answer = run(quiet);
+  EXPECT_EQ(answer.status, 0);
+  EXPECT_EQ(answer.out, "");
+  EXPECT_EQ(answer.err, "voxdag: warning: " + warning + "\n");
+  EXPECT_EQ(run_json(empty)["warnings"], Json({warning}));
+  const std::string of_empty = run_json({"exports", id})["exports"][3]["id"];
+  ASSERT_EQ(run({"exports", id, "--delete", of_empty}).status, 0);
+
   // Exports are listed, and deleted by their ids.
   const Json exports = run_json({"exports", id})["exports"];
   ASSERT_EQ(exports.size(), 3u);
@@ -309,20 +342,6 @@ TEST_F(Client, DownloadsExports) {
   expect_error(2, "--force", {"download", id, "--to", "ply", "-o", "m.glb"});
   expect_error(2, "--up", {"download", id, "--to", "ply", "--up", "x", "-o", "x.ply"});
 }
-
-  // Warnings are printed also with --quiet. The middle of the sponge is empty.
-  const std::vector<std::string> empty = {
-      "download", id, "--to", "vdag", "--region", "30,30,30,34,34,34", "-o", "empty.vdag"};
-  const std::string warning = "the selection has no voxels: the file will have no nodes";
-  std::vector<std::string> quiet = empty;
-  quiet.push_back("-q");
-  const Answer answer = run(quiet);
-  EXPECT_EQ(answer.status, 0);
-  EXPECT_EQ(answer.out, "");
-  EXPECT_EQ(answer.err, "voxdag: warning: " + warning + "\n");
-  EXPECT_EQ(run_json(empty)["warnings"], Json({warning}));
-  const std::string of_empty = run_json({"exports", id})["exports"][3]["id"];
-  ASSERT_EQ(run({"exports", id, "--delete", of_empty}).status, 0);
 
 // Jobs that wait in the queue behind a long job can be suspended, canceled and resumed.
 TEST_F(Client, SuspendsCancelsAndResumes) {
