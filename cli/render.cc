@@ -183,7 +183,8 @@ void run(RenderCommand& command, CommandContext& context) {
 
 void declare(Command& command, RenderCommand& state) {
   command.option("input", state.input, "the .vdag file").required();
-  command.output_option("-o,--output", state.output.path, "the .png or .jpg file to write");
+  const Option picture =
+      command.output_option("-o,--output", state.output.path, "the .png or .jpg file to write");
   command.output_option(
       "--depth", state.depth,
       "the .npy file to write: distances in voxels, inf where there is no surface");
@@ -197,9 +198,11 @@ void declare(Command& command, RenderCommand& state) {
   command.option("--size", state.size, "WIDTHxHEIGHT in pixels").show_default();
   command.option("--samples", state.options.samples, "N: N * N samples per pixel")
       .range(1, 8)
+      .needs(picture)
       .show_default();
   command.option("--background", state.background, "what pixels without a surface show")
       .one_of(query::background_names())
+      .needs(picture)
       .show_default();
   command
       .option(
@@ -207,8 +210,9 @@ void declare(Command& command, RenderCommand& state) {
           "what the colors show: the scene's colors, how often equal parts occur (sharing), the "
           "levels of the visible cells, or the normals")
       .one_of(query::shade_names())
+      .needs(picture)
       .show_default();
-  command.flag("--gray", state.gray, "leave out the colors that the file may have");
+  command.flag("--gray", state.gray, "leave out the colors that the file may have").needs(picture);
   command.option("--memory", state.memory,
                  "limit of the memory that is allocated (default: half the RAM; at least 64MiB)");
   command.threads_option(state.options.threads);

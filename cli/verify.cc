@@ -176,30 +176,33 @@ void run(const VerifyCommand& command, CommandContext& context) {
 
 void declare(Command& command, VerifyCommand& state) {
   command.option("file", state.path, "the .vdag file").required();
-  command.option("--against", state.scenes,
-                 "compare a sample of voxels, and of colors, with the triangles of this scene");
-  command.option("--seed", state.seed, "seed of the sample that --against compares").show_default();
+  const Option against =
+      command.option("--against", state.scenes,
+                     "compare a sample of voxels, and of colors, with the triangles of this scene");
+  const auto of_scene = [&](Option option) { return option.needs(against); };
+  of_scene(command.option("--seed", state.seed, "seed of the sample that --against compares"))
+      .show_default();
   command.option("--memory", state.memory,
                  "memory for tables and for the scene of --against, and limit above which pages "
                  "of the file are dropped; default: half the RAM");
   command.option("--work", state.work,
                  "folder for temporary files if the tables do not fit in --memory; default: the "
                  "folder of the file");
-  command.flag("--skip-invalid", state.scene_options.skip_invalid,
-               "drop invalid triangles of the scene, as the build did");
-  command.option("--cutouts", state.cutouts, "skip or keep, as in the build")
+  of_scene(command.flag("--skip-invalid", state.scene_options.skip_invalid,
+                        "drop invalid triangles of the scene, as the build did"));
+  of_scene(command.option("--cutouts", state.cutouts, "skip or keep, as in the build"))
       .one_of({"skip", "keep"});
-  command.option("--solid", state.solid, "winding, parity or enclosed, as in the build")
+  of_scene(command.option("--solid", state.solid, "winding, parity or enclosed, as in the build"))
       .one_of({"winding", "parity", "enclosed"});
-  command.option("--radius", state.radius, "radius of the solid, as in the build");
-  command.flag("--thin", state.thin, "the build set thin voxels (--thin)");
-  command.option("--point-radius", state.scene_options.point_radius,
-                 "half edge of the cube that replaces each point, as in the build");
-  command.option("--columns", state.scene_options.columns,
-                 "columns of text files with points, as in the build");
-  command
-      .option("--ignore-extension", state.scene_options.ignored_extensions,
-              "required extension of a glTF file to ignore, as in the build; repeatable")
+  of_scene(command.option("--radius", state.radius, "radius of the solid, as in the build"));
+  of_scene(command.flag("--thin", state.thin, "the build set thin voxels (--thin)"));
+  of_scene(command.option("--point-radius", state.scene_options.point_radius,
+                          "half edge of the cube that replaces each point, as in the build"));
+  of_scene(command.option("--columns", state.scene_options.columns,
+                          "columns of text files with points, as in the build"));
+  of_scene(command.option("--ignore-extension", state.scene_options.ignored_extensions,
+                          "required extension of a glTF file to ignore, as in the build; "
+                          "repeatable"))
       .one_value_each();
   command.flag("--quick", state.quick,
                "in a file in the order first-parent, do not look for equal nodes");

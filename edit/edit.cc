@@ -9,6 +9,7 @@
 #include "core/format/global/watched_file.h"
 #include "core/io/outputs/temporary_work.h"
 #include "core/io/overwrite.h"
+#include "query/attributes/color_levels.h"
 #include "query/dag/locked_outputs.h"
 #include "query/morphology/morphology.h"
 #include "scene/formats/formats.h"
@@ -115,6 +116,10 @@ class Edit {
       progress_.warn(option_text("fill_color") +
                      " has no effect: it is used if a file without colors is pasted to a file with "
                      "colors, or a file with colors to a file without");
+    if (spec_.color_resolution == 0 || first.attributes.any()) return;
+    query::refuse_color_resolution(*input, spec_.color_resolution);
+    progress_.warn(query::unused_color_resolution());
+    spec_.color_resolution = 0;
   }
   template <class Step>
   void apply(const Step& step) {
@@ -132,6 +137,7 @@ class Edit {
   void unite(const std::string& path, const std::optional<std::array<int64_t, 3>>& offset) {
     spec_.operation = query::Operation::kUnion;
     spec_.offset = offset;
+    spec_.clip = edit_.clip && offset.has_value();
     const auto other = open_global_file(path);
     apply([&](const voxdag_reader::File& file) {
       query::CombineSpec spec = spec_;
@@ -183,6 +189,12 @@ query::CombineReport edit(const EditSpec& spec, FileSystem& files, Progress& pro
     throw Error(ErrorCode::kInvalidInput, option_text("outside_set") +
                                               " was given without an erosion: expected " +
                                               option_text("erode"));
+  if (spec.clip && spec.parts.empty())
+    throw Error(ErrorCode::kInvalidInput, option_text("clip") +
+                                              " was given without a file to paste: expected " +
+                                              option_text("paste"));
+  query::check_attribute_options(spec.attributes, spec.fill_color.has_value(),
+                                 spec.color_resolution);
   if (spec.cuts.empty() && spec.scenes.empty() && spec.parts.empty() && spec.dilate == 0 &&
       spec.erode == 0)
     throw Error(ErrorCode::kInvalidInput, "no edit was given: expected " + option_text("cut") +

@@ -45,8 +45,8 @@ struct EditSpec {
 
 // Checks all files, applies the edits, and writes the result to spec.output, which gets its final
 // name when it is complete. Temporary files are in a folder next to the output. Throws Error:
-// kInvalidInput if there is no edit, if there is a dilation and an erosion, or if a shape is
-// invalid; and the errors of query::combine() and run_build().
+// kInvalidInput if there is no edit, if there is a dilation and an erosion, if a shape is invalid,
+// or if a member needs another member; and the errors of query::combine() and run_build().
 query::CombineReport edit(const EditSpec& spec, FileSystem& files, Progress& progress,
                           const CancelToken& cancel);
 

@@ -101,7 +101,8 @@ class ChainedCursor : public TriangleCursor {
 
 class ChainedScene : public TriangleSource {
  public:
-  explicit ChainedScene(std::vector<std::unique_ptr<TriangleSource>> sources) {
+  ChainedScene(std::vector<std::unique_ptr<TriangleSource>> sources, std::vector<Warning> warnings)
+      : warnings_(std::move(warnings)) {
     for (auto& source : sources) {
       const uint64_t first = declared_triangles(), count = source->declared_triangles();
       if (count > INT64_MAX - first)
@@ -133,6 +134,7 @@ class ChainedScene : public TriangleSource {
   std::vector<Warning> warnings() const override {
     WarningList all;
     for (const Part& part : parts_) all.add(part.source->warnings());
+    all.add(warnings_);
     return all.list();
   }
 
@@ -146,14 +148,16 @@ class ChainedScene : public TriangleSource {
   }
 
   std::vector<Part> parts_;
+  const std::vector<Warning> warnings_;
   uint32_t material_count_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<TriangleSource> chain_scenes(std::vector<std::unique_ptr<TriangleSource>> parts) {
-  if (parts.size() == 1) return std::move(parts.front());
-  return std::make_unique<ChainedScene>(std::move(parts));
+std::unique_ptr<TriangleSource> chain_scenes(std::vector<std::unique_ptr<TriangleSource>> parts,
+                                             std::vector<Warning> warnings) {
+  if (parts.size() == 1 && warnings.empty()) return std::move(parts.front());
+  return std::make_unique<ChainedScene>(std::move(parts), std::move(warnings));
 }
 
 }  // namespace voxdag

@@ -85,6 +85,13 @@ struct SceneMaterials {
   }
 };
 
+// The members of SceneOptions that affect a scene. skip_invalid is not included, because only
+// reading all triangles shows whether a scene has invalid triangles.
+struct UsedOptions {
+  bool point_radius = false, columns = false;
+  std::vector<std::string> ignored_extensions;
+};
+
 class TriangleSource {
  public:
   using Visitor = TriangleCursor::Visitor;
@@ -106,6 +113,8 @@ class TriangleSource {
   // Returns all files that the triangles come from, with their identity when they were first
   // opened. Reading throws an Error if a file has another identity when it is opened again.
   virtual std::vector<SourceFile> files() const { return {}; }
+  // Returns the members of SceneOptions that affect this scene.
+  virtual UsedOptions used_options() const { return {}; }
   // Warnings about the files (ignored optional extensions, points and lines that make no voxels).
   virtual std::vector<Warning> warnings() const { return {}; }
 };

@@ -166,20 +166,24 @@ void run(const PublishCommand& command, CommandContext& context) {
 void declare(Command& command, PublishCommand& state) {
   command.option("input", state.input, "the .vdag file");
   command.output_option("-o,--output", state.output, "the folder to write, for a web server");
-  command.option("--check", state.check, "check all files of a folder that this command wrote");
-  command.option("--title", state.title, "title of the page (default: the name of the file)");
-  const Option single_file = command.flag("--single-file", state.single_file,
-                                          "write one HTML file, which needs no web server");
+  const Option check =
+      command.option("--check", state.check, "check all files of a folder that this command wrote");
+  const auto of_writing = [&](Option option) { return option.excludes(check); };
+  of_writing(
+      command.option("--title", state.title, "title of the page (default: the name of the file)"));
+  const Option single_file = of_writing(command.flag(
+      "--single-file", state.single_file, "write one HTML file, which needs no web server"));
   command.flag("--force", state.force, "replace an existing file").needs(single_file);
-  command
-      .option("--url", state.url,
-              "address of the published folder: other web sites then show a picture with links")
+  of_writing(command.option("--url", state.url,
+                            "address of the published folder: other web sites then show a picture "
+                            "with links"))
       .excludes(single_file);
-  command.flag("--no-poster", state.no_poster,
-               "leave out the picture that the page shows while it loads");
-  command.flag("--gray", state.gray, "leave out the colors");
-  command.option("--pack-size", state.pack_size,
-                 "size of the files with tiles, such as 8MiB, the default");
+  of_writing(command.flag("--no-poster", state.no_poster,
+                          "leave out the picture that the page shows while it loads"));
+  of_writing(command.flag("--gray", state.gray, "leave out the colors"));
+  of_writing(command.option("--pack-size", state.pack_size,
+                            "size of the files with tiles, such as 8MiB, the default"))
+      .excludes(single_file);
   command.memory_option(state.memory);
   command.threads_option(state.threads);
   command.quiet_flag(state.quiet);

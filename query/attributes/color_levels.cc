@@ -10,6 +10,18 @@
 
 namespace voxdag::query {
 
+void check_attribute_options(bool has_attributes, bool has_fill_color, uint64_t color_resolution) {
+  if (has_attributes || (!has_fill_color && color_resolution == 0)) return;
+  throw Error(ErrorCode::kInvalidInput,
+              option_text(has_fill_color ? "fill_color" : "color_resolution") + " and " +
+                  option_text("no_attributes") + " were both given: expected one of them");
+}
+
+std::string unused_color_resolution() {
+  return option_text("color_resolution") +
+         " has no effect: the result has no colors and no other attributes";
+}
+
 void refuse_color_resolution(const voxdag_reader::File& a, uint64_t cells) {
   if (cells == 0) return;
   if (std::has_single_bit(cells) && cells >= uint64_t{1} << kBrickLevels &&

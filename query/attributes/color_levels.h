@@ -12,6 +12,12 @@
 
 namespace voxdag::query {
 
+// Throws Error{kInvalidInput} if the new file has no attributes (`has_attributes` is false),
+// although the user has set an option for its attributes.
+void check_attribute_options(bool has_attributes, bool has_fill_color, uint64_t color_resolution);
+// Returns a warning: the option color_resolution was set, but the files have no attributes.
+std::string unused_color_resolution();
+
 // Throws Error{kInvalidInput} unless `cells`, the maximum number of color cells per edge of the
 // grid of `a`, is 0 (no limit) or a power of two from 4 to the resolution.
 void refuse_color_resolution(const voxdag_reader::File& a, uint64_t cells);

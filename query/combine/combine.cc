@@ -286,6 +286,8 @@ AttributeInputs attribute_inputs(const voxdag_reader::File& a, const voxdag_read
                   "of the files has colors");
   if (!spec.attributes) return inputs;
   inputs.attributes = combined_attributes(first, b, spec.operation, spec.fill_color.has_value());
+  if (spec.color_resolution > 0 && inputs.attributes.empty())
+    progress.warn(unused_color_resolution());
   inputs.levels =
       color_levels_of(a, first.name, b, inputs.attributes, spec.color_resolution, progress);
   return inputs;
@@ -296,6 +298,11 @@ AttributeInputs attribute_inputs(const voxdag_reader::File& a, const voxdag_read
 CombineReport combine(const voxdag_reader::File& a, const voxdag_reader::File& b,
                       const CombineSpec& spec, FileSystem& files, Progress& progress,
                       const CancelToken& cancel) {
+  check_attribute_options(spec.attributes, spec.fill_color.has_value(), spec.color_resolution);
+  if (spec.clip && !spec.offset)
+    throw Error(
+        ErrorCode::kInvalidInput,
+        option_text("clip") + " was given without a move: expected " + option_text("offset"));
   const WatchedFile watched_a(a), watched_b(b);
   const auto check_readable = [&] {
     watched_a.check_readable();

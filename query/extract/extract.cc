@@ -70,8 +70,12 @@ class Extraction {
   // Writes the output. Calls before_publish() before the output gets its final name. If
   // before_publish() throws, the output is discarded.
   ExtractReport run(const std::function<void()>& before_publish) {
-    if (spec_.crop && crop_.level == 0 &&
-        spec_.selection.region != whole_grid(spec_.selection.grid_levels))
+    const bool is_whole = spec_.selection.region == whole_grid(spec_.selection.grid_levels);
+    if (spec_.crop && is_whole)
+      warn(option_text("crop") + " has no effect: the region is the complete grid");
+    if (spec_.majority && spec_.selection.grid_levels == file_.grid_levels())
+      warn(option_text("majority") + " has no effect: the level is not coarser than the file");
+    if (spec_.crop && crop_.level == 0 && !is_whole)
       warn(
           "the region has cells on both sides of a plane through the middle of the grid: the "
           "smallest octree cube around it is the complete grid");
@@ -144,9 +148,9 @@ class Extraction {
                                        std::vector<ArtifactRef>& built);
   MergeInputs merge_inputs(std::vector<ArtifactRef> artifacts);
 
-  void warn(const char* message) {
+  void warn(const std::string& message) {
     progress_.warn(message);
-    report_.warnings.emplace_back(message);
+    report_.warnings.push_back(message);
   }
 
   const ExtractSpec& spec_;

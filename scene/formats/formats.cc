@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/options/option_text.h"
 #include "scene/chained_scene.h"
 #include "scene/formats/unknown_file.h"
 #include "scene/gltf/gltf_scene.h"
 #include "scene/gltf/json/container.h"
+#include "scene/messages.h"
 #include "scene/obj/obj_scene.h"
 #include "scene/ply/ply_scene.h"
 #include "scene/points/las_header.h"
@@ -47,6 +49,32 @@ const SceneFormat& format_of(const ReadableFile& file) {
   refuse_unknown_file(file);
 }
 
+using Parts = std::vector<std::unique_ptr<TriangleSource>>;
+
+// Returns a warning for each option that the user has given but that affects no file of the scene.
+std::vector<Warning> unused_options(const Parts& parts, const SceneOptions& options) {
+  std::vector<Warning> warnings;
+  const auto check = [&](const std::string& option, const char* reason, const auto& is_used) {
+    const auto uses = [&](const auto& part) { return is_used(part->used_options()); };
+    if (std::ranges::none_of(parts, uses))
+      warnings.push_back({"unused-option", "", option + " has no effect: " + reason});
+  };
+  if (options.point_radius > 0)
+    check(option_text("point_radius"), "no file of the scene is a file of points",
+          [](const UsedOptions& used) { return used.point_radius; });
+  if (!options.columns.empty())
+    check(option_text("columns"), "no file of the scene is a text file with points",
+          [](const UsedOptions& used) { return used.columns; });
+  for (const std::string& name : options.ignored_extensions)
+    check(option_text("ignore_extension", printable(name)),
+          "no glTF file of the scene requires this extension, or voxdag reads it",
+          [&](const UsedOptions& used) {
+            return std::ranges::find(used.ignored_extensions, name) !=
+                   used.ignored_extensions.end();
+          });
+  return warnings;
+}
+
 std::vector<std::string_view> all_endings() {
   std::vector<std::string_view> all;
   for (const SceneFormat& format : kFormats)
@@ -78,14 +106,15 @@ std::string list_scene_endings(const std::string& separator, const std::string& 
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel) {
-  std::vector<std::unique_ptr<TriangleSource>> parts;
+  Parts parts;
   for (const std::string& path : paths) {
     cancel.check();
     std::unique_ptr<ReadableFile> file = files.open_read(path);
     const SceneFormat& format = format_of(*file);
     parts.push_back(format.open(files, std::move(file), options, budget, cancel));
   }
-  return chain_scenes(std::move(parts));
+  std::vector<Warning> warnings = unused_options(parts, options);
+  return chain_scenes(std::move(parts), std::move(warnings));
 }
 
 }  // namespace voxdag

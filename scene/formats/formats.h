@@ -40,7 +40,8 @@ std::string list_scene_endings(const std::string& separator = ", ",
 // with points may also be recognized by their ending. Geometry is read in windows charged to
 // `budget`. Images are never read. Opening checks the structure of a file, and reading the
 // triangles checks their contents. Both check `cancel`. Throws Error{kInvalidInput}, {kNotFound},
-// {kLimit} or {kOutOfMemory} with the name of the file. `files`, `budget` and `cancel` must outlive
+// {kLimit} or {kOutOfMemory} with the name of the file. The scene's warnings name the options that
+// affect none of the files. `files`, `budget` and `cancel` must outlive
 // the scene.
 std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<std::string>& paths,
                                            const SceneOptions& options, MemoryBudget& budget,

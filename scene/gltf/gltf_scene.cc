@@ -10,6 +10,7 @@
 #include "core/base/integers.h"
 #include "scene/gltf/document/check_document.h"
 #include "scene/gltf/document/read_document.h"
+#include "scene/gltf/extensions/extension_info.h"
 #include "scene/gltf/materials/document_materials.h"
 #include "scene/gltf/materials/image_sources.h"
 #include "scene/gltf/mesh_data/draco_counts.h"
@@ -128,6 +129,15 @@ class GltfScene : public TriangleSource {
     std::vector<SourceFile> all{{file_->path(), file_->identity()}};
     for (const SourceFile& file : external_files_.all()) all.push_back(file);
     return all;
+  }
+  UsedOptions used_options() const override {
+    UsedOptions used;
+    for (const std::string& name : options_.ignored_extensions)
+      if (std::ranges::find(document_.extensions_required, name) !=
+              document_.extensions_required.end() &&
+          extension_info(name).support == ExtensionSupport::kUnknown)
+        used.ignored_extensions.push_back(name);
+    return used;
   }
   std::vector<Warning> warnings() const override { return warnings_.list(); }
 

@@ -40,6 +40,8 @@ class PointFile {
   virtual const ReadableFile& file() const = 0;
   virtual uint64_t count() const = 0;
   virtual bool has_colors() const = 0;
+  // True if SceneOptions::columns can name the columns of the file.
+  virtual bool has_columns() const { return false; }
   virtual std::vector<Warning> warnings() const { return {}; }
   // Returns a reader. `readers` is the number of readers that share the budget. The file and the
   // budget must outlive the reader.

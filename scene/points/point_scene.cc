@@ -25,6 +25,9 @@ class PointScene : public TriangleSource {
   std::vector<SourceFile> files() const override {
     return {{points_->file().path(), points_->file().identity()}};
   }
+  UsedOptions used_options() const override {
+    return {.point_radius = true, .columns = points_->has_columns(), .ignored_extensions = {}};
+  }
   std::vector<Warning> warnings() const override { return points_->warnings(); }
 
  private:

@@ -31,6 +31,7 @@ class TextFile : public PointFile {
   const ReadableFile& file() const override { return *file_; }
   uint64_t count() const override { return index_.rows(); }
   bool has_colors() const override { return index_.columns().has_colors(); }
+  bool has_columns() const override { return true; }
   std::unique_ptr<PointReader> open(unsigned readers, MemoryBudget& budget) const override;
 
   const RowIndex& index() const { return index_; }

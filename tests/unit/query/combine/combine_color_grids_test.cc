@@ -113,7 +113,9 @@ TEST_F(CombineColors, WarnsOfAnUnusedFillColor) {
   expect_warning(true);
   filled.operation = Operation::kXor;
   filled.attributes = false;
-  expect_warning(true);
+  const Error error = error_of([&] { combine_files("a", "b", filled); });
+  EXPECT_EQ(error.code(), ErrorCode::kInvalidInput);
+  EXPECT_THAT(error.message(), testing::HasSubstr("--fill-color and --no-attributes"));
 }
 
 }  // namespace

@@ -137,8 +137,8 @@ TEST_F(ExtractErrors, Killed) {
 }
 
 // The crop cube of a region around the middle of the grid is the complete grid. The extract then
-// warns that it was not cropped. The crop cube of a region on one side of the middle is smaller,
-// and gives no warning.
+// warns that it was not cropped, also if the region is the complete grid. The crop cube of a region
+// on one side of the middle is smaller, and gives no warning.
 TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   const auto is_said = [&](const Region& region, bool crop) {
     warnings_.texts.clear();
@@ -149,7 +149,8 @@ TEST_F(ExtractErrors, CropOfNothingIsSaid) {
   };
   EXPECT_TRUE(is_said({{31, 0, 0}, {33, 64, 64}}, true));
   EXPECT_FALSE(is_said({{0, 0, 0}, {32, 32, 32}}, true));
-  EXPECT_FALSE(is_said(whole_grid(6), true));
+  EXPECT_TRUE(is_said(whole_grid(6), true));
+  EXPECT_FALSE(is_said(whole_grid(6), false));
   EXPECT_FALSE(is_said({{31, 0, 0}, {33, 64, 64}}, false));
 }
 
