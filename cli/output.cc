@@ -62,7 +62,10 @@ void OutputFile::guard(GuardedOutputs& files) const {
 void OutputFile::check(FileSystem& files, const std::string& input, const IsOwnFile& is_own) const {
   check(files, path, input, is_own);
   check(files, path + ".partial", input, is_own);
-  expect_parent_folder(files, path);
+  const std::string folder = parent_directory(path);
+  if (!files.exists(folder))
+    throw Error(ErrorCode::kNotFound,
+                path + ": the folder " + folder + " does not exist: expected an existing folder");
 }
 
 void OutputFile::check(FileSystem& files, const std::string& name, const std::string& input,

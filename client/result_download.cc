@@ -5,7 +5,6 @@
 #include "client/retry_policy.h"
 #include "core/base/error.h"
 #include "core/format/checksum.h"
-#include "core/io/overwrite.h"
 
 namespace voxdag::client {
 namespace {
@@ -26,7 +25,7 @@ class Download {
         partial_(output + "." + sha256_.substr(0, kDigitsInPartialName) + ".partial") {}
 
   DownloadResult run() {
-    expect_parent_folder(files_, output_);
+    files_.make_directories(parent_directory(output_));
     const uint64_t resumed_bytes = bytes_present();
     if (size_ == 0) files_.create(partial_)->close();
     for (RetryPolicy retry(service_.cancel()); bytes_present() < size_;) {

@@ -101,12 +101,12 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
 namespace {
 
 void check_report(FileSystem& files, const std::string& report, const std::string& output) {
-  expect_parent_folder(files, report);
   if (report == output || report == output + ".partial" || report.ends_with('/'))
     throw Error(ErrorCode::kInvalidInput, option_text("report") + " " + report +
                                               ": expected a file other than the output, or none");
   refuse_foreign_file(files, report, is_report, " (the report)");
   refuse_foreign_file(files, report + ".partial", is_report, " (the report)");
+  files.make_directories(parent_directory(report));
 }
 
 }  // namespace
@@ -125,7 +125,6 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
   if (!spec.run.cache_folder.empty() && resolved(spec.run.cache_folder) == resolved(work))
     throw Error(ErrorCode::kInvalidInput, work + " is both the cache (" + option_text("cache") +
                                               ") and the work folder: expected two folders");
-  expect_parent_folder(files, output);
   const std::string partial = output + ".partial", report = report_path(spec.run);
   std::vector<std::string> outputs = {output, partial, OutputLock::path_of(output)};
   if (!report.empty()) outputs.insert(outputs.end(), {report, report + ".partial"});
@@ -136,6 +135,7 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
   // damaged.
   if (!files.exists(WorkFolder::store_path(work)))
     refuse_foreign_file(files, partial, is_partial_global_file, " (-o)");
+  files.make_directories(parent_directory(output));
   if (!report.empty()) check_report(files, report, output);
   if (!spec.run.cache_folder.empty()) files.make_directories(spec.run.cache_folder);
 }

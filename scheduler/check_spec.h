@@ -28,8 +28,7 @@ void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::strin
 
 // Throws Error{kInvalidInput} if the output path is missing or names a folder, if the cache folder
 // is the work folder, or if the build would overwrite a scene or a file not created by voxdag.
-// Throws Error{kNotFound} if the folder of the output or of the report does not exist. Creates the
-// cache folder.
+// Creates the output's parent folder and the cache folder.
 void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& context);
 
 }  // namespace voxdag

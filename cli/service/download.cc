@@ -10,7 +10,6 @@
 #include "core/base/text/printable.h"
 #include "core/fields/json_fields.h"
 #include "core/format/global/global_writer.h"
-#include "core/io/overwrite.h"
 #include "server/jobs/protocol/export_spec.h"
 
 namespace voxdag::cli {
@@ -91,7 +90,6 @@ void run(const DownloadCommand& command, ServiceClient& service, CommandContext&
     const OutputFile output{path, command.output.force};
     output.guard(files);
     output.check(files, path, "", is_own);
-    expect_parent_folder(files, path);
   }
   const auto progress = make_progress_bar(command.quiet);
   if (is_export) return download_export(command, service, files, paths, *progress);

@@ -34,13 +34,6 @@ std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string
   }
 }
 
-void expect_parent_folder(FileSystem& files, const std::string& path) {
-  const std::string folder = parent_directory(path);
-  if (!files.exists(folder))
-    throw Error(ErrorCode::kNotFound,
-                path + ": the folder " + folder + " does not exist: expected an existing folder");
-}
-
 void refuse_link(const std::string& path) {
   struct stat found {};
   if (lstat(path.c_str(), &found) == 0 && S_ISLNK(found.st_mode))

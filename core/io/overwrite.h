@@ -20,10 +20,6 @@ std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string
 // link instead of the file to which it points, and this file could be anywhere.
 void refuse_link(const std::string& path);
 
-// Throws Error{kNotFound} if the folder of `path` does not exist. Commands do not create the folder
-// of a file that they write, because a missing folder is often a mistyped path.
-void expect_parent_folder(FileSystem& files, const std::string& path);
-
 // Throws Error{kInvalidInput} if one of `paths` is the same file as one of `inputs`. The files at
 // `paths` need not exist.
 void refuse_inputs(FileSystem& files, std::span<const std::string> paths,

@@ -174,13 +174,11 @@ def test_output_that_cannot_be_written(tmp_path, mesh):
     assert not (tmp_path / "x.vdag").exists()
 
 
-def test_a_missing_folder_is_refused(tmp_path, mesh):
-    output = tmp_path / "new" / "x.vdag"
-    voxdag.plan(mesh, resolution=64, output=output)
-    with pytest.raises(voxdag.Error) as refused:
-        voxdag.build(mesh, resolution=64, output=output)
-    assert refused.value.code == "not_found"
+def test_a_folder_that_is_not_there_is_made(tmp_path, mesh):
+    voxdag.plan(mesh, resolution=64, output=tmp_path / "new" / "x.vdag")
     assert not (tmp_path / "new").exists()
+    voxdag.build(mesh, resolution=64, output=tmp_path / "new" / "x.vdag")
+    assert not list((tmp_path / "new").glob("*.ply"))
 
 
 def test_what_progress_raises_ends_the_build(mesh, tmp_path):

@@ -107,9 +107,8 @@ bool needs_fill_color(const FirstFile& a, const voxdag_reader::File& b, const Co
 //   - The nodes of a file are not in the order by hash. With spec.offset, only the first file must
 //     have this order.
 //   - Moved voxels are outside of the grid, and spec.clip is false.
-//   - spec.clip is true without spec.offset, or spec.attributes is false although spec.fill_color
-//   or
-//     spec.color_resolution is set.
+//   - spec.clip is true without spec.offset.
+//   - spec.fill_color or spec.color_resolution is set, but spec.attributes is false.
 //   - The operation needs an attribute that only one file has (docs/extract.md).
 //   - spec.color_resolution is not a power of two from 4 to the resolution, or so small that a
 //   color

@@ -19,7 +19,10 @@ void refuse_impossible(FileSystem& files, const Outputs& outputs) {
     const std::array<std::string, 2> names = {path, partial_path(path)};
     for (const std::string& name : names) refuse_link(name);
     refuse_inputs(files, names, outputs.inputs);
-    expect_parent_folder(files, path);
+    const std::string folder = parent_directory(path);
+    if (!files.exists(folder))
+      throw Error(ErrorCode::kNotFound,
+                  path + ": the folder " + folder + " does not exist: expected an existing folder");
   }
 }
 

@@ -44,7 +44,10 @@ std::set<std::string> hashed_files(const PackageIndex& index) {
 }
 
 void refuse_other_folder(FileSystem& files, const std::string& path) {
-  expect_parent_folder(files, path);
+  const std::string parent = parent_directory(path);
+  if (!files.exists(parent))
+    throw Error(ErrorCode::kNotFound,
+                path + ": the folder " + parent + " does not exist: expected an existing folder");
   if (!files.exists(path)) return;
   const std::string advice = ": expected a new folder, an empty one or an earlier package";
   if (!is_folder(files, path))

@@ -1,8 +1,6 @@
 // voxdag build: its report, its files, its options, its errors.
 #include <sys/stat.h>
 
-#include <filesystem>
-
 #include "core/base/process_limits.h"
 #include "tests/cli/command_line.h"
 
@@ -94,8 +92,8 @@ TEST_F(BuildCommand, OnlyGeometryOptionsChangeTheBytes) {
       build({"--memory", "64MiB", "--threads", "1", "--subvolume", "64", "--work", "w"})["sha256"],
       sha256);
   EXPECT_EQ(contents("m.vdag"), bytes);
-  std::filesystem::create_directory(folder_.file("sub"));
-  EXPECT_EQ(build({"--backend", "cpu", "--force", "--restart"}, "sub/n.vdag")["sha256"], sha256);
+  EXPECT_EQ(build({"--backend", "cpu", "--force", "--restart"}, "sub/folder/n.vdag")["sha256"],
+            sha256);
   EXPECT_NE(build({"--hash-bits", "8"})["sha256"], sha256);
   EXPECT_NE(build({"--voxel-size", "0.1"})["sha256"], sha256);
   const Json part = build({"--bounds", "0,0,0,4.5"});
@@ -169,30 +167,12 @@ TEST_F(BuildCommand, KeepsResultsOfOtherScenes) {
   EXPECT_EQ(run(other).status, 0);
 }
 
-// A build does not create the folder of its output or report, which can be a mistyped path. It
-// creates folders for temporary files and for the cache.
-TEST_F(BuildCommand, NeedsTheFoldersOfItsOutputs) {
-  const std::vector<std::string> command = {"build", "m.glb", "-r", "64", "-o"};
-  const auto expect_missing = [&](const std::string& path, const std::vector<std::string>& more) {
-    std::vector<std::string> args = command;
-    args.insert(args.end(), more.begin(), more.end());
-    expect_error(3, path + ": the folder none does not exist: expected an existing folder", args);
-    EXPECT_FALSE(exists("none"));
-  };
-  expect_missing("none/n.vdag", {"none/n.vdag"});
-  expect_missing("none/r.json", {"n.vdag", "--report", "none/r.json"});
-  EXPECT_FALSE(exists("n.vdag.work"));
-  build({"--work", "new/w", "--cache", "new/c/d"});
-  EXPECT_TRUE(exists("new/c/d"));
-}
-
 TEST_F(BuildCommand, WritesTheReportWhereItIsWanted) {
   const Json printed = build({"--report", "none", "--solid", "enclosed"});
   EXPECT_FALSE(exists("m.vdag.report.json"));
   EXPECT_GT(printed["wall_s"], 0);
   EXPECT_FALSE(printed["stages"].empty());
   EXPECT_TRUE(printed.contains("solid"));
-  std::filesystem::create_directory(folder_.file("reports"));
   const Json report = build({"--report", "reports/m.json"}, "n.vdag");
   EXPECT_FALSE(exists("n.vdag.report.json"));
   EXPECT_EQ(Json::parse(contents("reports/m.json")), report);

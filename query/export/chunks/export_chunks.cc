@@ -10,7 +10,6 @@
 #include "core/base/options/option_text.h"
 #include "core/fields/json_text.h"
 #include "core/format/checksum.h"
-#include "core/io/overwrite.h"
 #include "query/export/dag_export.h"
 #include "query/export/export_job.h"
 #include "query/lookup/bricks.h"
@@ -93,7 +92,6 @@ void check_chunks(const ChunksRequest& request) {
 }
 
 void check_folder(FileSystem& files, const ExportRequest& request) {
-  expect_parent_folder(files, request.output);
   if (!files.exists(request.output) || request.replace || files.list(request.output).empty())
     return;
   throw Error(ErrorCode::kInvalidInput, request.output +
@@ -184,9 +182,11 @@ class ChunkWriter {
     } catch (const Error&) {
     }
   }
+  // Makes a folder and its missing parents.
   void make_folder(const std::string& path) {
     if (files_.exists(path)) return;
-    files_.make_directory(path);
+    make_folder(parent_directory(path));
+    files_.make_directories(path);
     folders_.push_back(path);
   }
   std::array<double, 6> world_box(const Selection& selection) const {

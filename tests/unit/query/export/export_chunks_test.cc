@@ -125,19 +125,6 @@ TEST_F(ExportChunks, AFolderWithFilesIsRefused) {
     EXPECT_THROW(exported(static_cast<uint64_t>(edge), static_cast<uint64_t>(levels)), Error);
 }
 
-// An export creates its folder, but not the folder's parents.
-TEST_F(ExportChunks, NeedsTheParentFolder) {
-  ChunksRequest request{
-      {&export_format("npz"), {6, whole_grid(6)}, folder() + "/none", 64 << 20}, 64, 1};
-  const auto exported_to = [&] {
-    export_chunks(system_files(), *file_, request, progress_, cancel_);
-  };
-  EXPECT_EQ(error_of(exported_to).code(), ErrorCode::kNotFound);
-  EXPECT_FALSE(std::filesystem::exists(folder()));
-  std::filesystem::create_directory(folder());
-  EXPECT_NO_THROW(exported_to());
-}
-
 // A canceled export removes the folders that it has created, and no others.
 TEST_F(ExportChunks, ACanceledExportLeavesNoFolders) {
   progress_.cancel = &cancel_;
