@@ -93,6 +93,8 @@ Sample check_against(const VerifyCommand& command, const voxdag_reader::File& fi
           file, grid, context.files, *scene, command.seed, file.path() + ".images.vdspill",
           command.threads, budget, progress, context.cancel, cutouts);
   });
+  for (const Warning& warning : scene->warnings())
+    if (warning.code == "unused-option") progress.warn(warning.message);
   return sample;
 }
 

@@ -144,6 +144,7 @@ class Edit {
       if (!query::needs_fill_color({file, spec.first_name, attributes_of(file), file.empty()},
                                    *other, spec))
         spec.fill_color.reset();
+      if (!attributes_of(file).any() && !attributes_of(*other).any()) spec.color_resolution = 0;
       return query::combine(file, *other, spec, files_, progress_, cancel_);
     });
   }

@@ -145,7 +145,7 @@ void fields(Visitor& visit, RunOptions& r) {
   visit(option("strict", "treat warnings about the scene as errors"), r.strict);
   visit(option("allow_empty", "write a file without voxels if the scene sets none"), r.allow_empty);
   visit(of_build("cache", "folder in which builds share subvolumes").path(), r.cache_folder);
-  visit(of_build("cache_size", "limit of the cache folder").bytes().needs("cache"), r.cache_bytes);
+  visit(of_build("cache_size", "limit of the cache folder").bytes(), r.cache_bytes);
   visit(of_build("keep_work", "do not remove the work folder"), r.keep_work);
   visit(of_build("restart", "start over instead of resuming the work folder"), r.restart);
   visit(of_build("force",
@@ -155,15 +155,13 @@ void fields(Visitor& visit, RunOptions& r) {
 
 template <class Visitor>
 void fields(Visitor& visit, ClusterOptions& c) {
-  visit(
-      Field("cluster", "engine of a cluster that builds").group(kClusterHeading).from(Scope::kPlan),
-      c.engine);
   const auto option = [](const char* name, const char* help) {
-    return Field(name, help).group(kClusterHeading).needs("cluster");
+    return Field(name, help).group(kClusterHeading);
   };
   const auto of_build = [&](const char* name, const char* help) {
     return option(name, help).from(Scope::kBuild);
   };
+  visit(option("cluster", "engine of a cluster that builds").from(Scope::kPlan), c.engine);
   visit(option("cluster_tasks", "tasks")
             .at_least(1)
             .unset_means("by expected work")

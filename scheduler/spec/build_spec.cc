@@ -26,7 +26,7 @@ class JsonVisitor {
 };
 
 // Checks the options that differ from their defaults. Throws FieldError if such an option breaks a
-// limit, or if it excludes or needs another option. The other option must be visited before it.
+// limit, or if it excludes another such option that was visited before.
 class LimitChecker {
  public:
   explicit LimitChecker(const FieldJson& defaults) : defaults_(defaults) {}
@@ -37,8 +37,6 @@ class LimitChecker {
     if (!fits(field, value)) json_fields::refuse(field.name, expectation<T>(field), given);
     if (given_.contains(field.excluded))
       json_fields::refuse(field.name, std::string("no ") + field.excluded + " at the same time");
-    if (*field.needed && !given_.contains(field.needed))
-      json_fields::refuse(field.name, std::string(field.needed) + " as well");
     given_.insert(field.name);
   }
 

@@ -34,19 +34,9 @@ TEST_F(UnusedOptions, AreRefusedIfTheyNeedAnotherOption) {
     std::string part;
   };
   const Case cases[] = {
-      {build, {"--cache-size", "1GiB"}, "--cache"},
       {build, {"--radius", "2"}, "'solid' to be enclosed"},
       {build, {"--seed", "1,1,1"}, "'solid' to be enclosed"},
       {build, {"--color-resolution", "16"}, "color or attributes"},
-#ifdef VOXDAG_HAS_CLUSTER
-      {build, {"--cluster-tasks", "3"}, "--cluster"},
-      {build, {"--cluster-running", "3"}, "--cluster"},
-      {build, {"--cluster-options", "--mem=8G"}, "--cluster"},
-      {build, {"--cluster-retries", "3"}, "--cluster"},
-      {build, {"--cluster-grace", "3"}, "--cluster"},
-      {build, {"--cluster-merge"}, "--cluster"},
-      {plan, {"--cluster-tasks", "3"}, "--cluster"},
-#endif
       {edit, {"--clip"}, "expected --paste"},
       {edit, {"--outside-set"}, "expected --erode"},
       {edit, {"--no-attributes", "--fill-color", "ff0000"}, "--fill-color and --no-attributes"},
@@ -127,7 +117,20 @@ TEST_F(UnusedOptions, CauseAWarningIfTheInputDoesNotNeedThem) {
     EXPECT_THAT(warnings_of(args), testing::HasSubstr("voxdag: warning: " + part));
     EXPECT_EQ(run_json(args)["warnings"][0]["code"], "unused-option");
     EXPECT_EQ(run(joined(args, {"--strict"})).status, 2);
+    EXPECT_THAT(run(joined({"verify", "m.vdag", "--against", "m.glb"}, option)).err,
+                testing::HasSubstr("voxdag: warning: " + part));
   }
+}
+
+// The first union has no colors, but the second has.
+TEST_F(UnusedOptions, CauseNoWarningIfALaterEditNeedsThem) {
+  ASSERT_EQ(run({"build", "m.glb", "-r", "64", "--color", "-o", "c.vdag"}).status, 0);
+  const Answer edited =
+      run({"edit", "m.vdag", "--paste", "m.vdag@0,0,0", "--paste", "c.vdag@0,0,0", "--fill-color",
+           "ff0000", "--color-resolution", "16", "-q", "-o", "x.vdag"});
+  EXPECT_EQ(edited.status, 0);
+  EXPECT_EQ(edited.err, "");
+  EXPECT_EQ(run_json({"info", "x.vdag"})["colors"]["resolution"], 16);
 }
 
 }  // namespace

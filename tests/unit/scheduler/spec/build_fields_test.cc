@@ -63,23 +63,6 @@ TEST(BuildFields, ZeroAndEmptyMeanTheDefault) {
   EXPECT_FALSE(accepts("backend", ""));
 }
 
-// An option that needs another option is refused without it, also if no command line has checked
-// this before.
-TEST(BuildFields, NeededOptionsAreChecked) {
-  BuildSpec spec;
-  spec.geometry.resolution = 64;
-  spec.run.cache_bytes = uint64_t{1} << 30;
-  try {
-    check_options(spec);
-    ADD_FAILURE() << "was accepted";
-  } catch (const FieldError& error) {
-    EXPECT_EQ(error.field, "cache_size");
-    EXPECT_THAT(error.message(), testing::HasSubstr("expected cache as well"));
-  }
-  spec.run.cache_folder = "folder";
-  check_options(spec);
-}
-
 TEST(BuildFields, UnknownEnumerationsAreRefused) {
   BuildSpec spec;
   spec.geometry.resolution = 64;
