@@ -1,15 +1,14 @@
 #include "bench/query/cold.h"
 
-#include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdio>
 #include <limits>
 #include <utility>
 
+#include "bench/page_cache.h"
 #include "core/format/global/open_global.h"
 #include "query/rays/ray_caster.h"
 #include "query/render/camera.h"
@@ -33,14 +32,6 @@ uint64_t hits_of(const DagView& dag, const Camera& camera) {
   return hits;
 }
 
-void forget_pages(const voxdag_reader::File& file) {
-  file.release_pages();
-  const int fd = ::open(file.path().c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return;
-  posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
-  ::close(fd);
-}
-
 int64_t major_faults() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -56,7 +47,8 @@ void measure_cold(const std::string& path) {
   std::printf("%s, a cold picture of %d x %d\n", path.c_str(), kWidth, kHeight);
   for (const auto& [advice, name] :
        {std::pair{MADV_RANDOM, "single pages"}, std::pair{MADV_NORMAL, "with read-ahead"}}) {
-    forget_pages(*file);
+    file->release_pages();
+    drop_from_page_cache(path);
     madvise(const_cast<unsigned char*>(file->data()), file->file_bytes(), advice);
     const int64_t faults = major_faults();
     const auto start = std::chrono::steady_clock::now();

@@ -6,8 +6,8 @@
 // --levels: the queries use the grid of 2^N cells per edge (default: the file's grid), and rays
 // stop at its cells. --picture: casts rays through the pixels of a square picture with this edge
 // (default: 1024). --rays: measures only rays. --cold: measures only the page faults of a picture
-// of a file that is not in memory. --scene: also casts the rays with Embree (if it is
-// installed) at the triangles of this scene, from which the following files were built.
+// of a file that is not in memory. --scene: also casts the rays with Embree (if it is installed) at
+// the triangles of this scene, from which the following files were built.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>

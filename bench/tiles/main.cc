@@ -18,8 +18,6 @@
 //
 // VIEWS is a file whose lines have a name and the camera options of `voxdag render`. With it, only
 // these views are measured, until no cell is wider than P pixels. The viewer uses P = 0.75.
-#include <fcntl.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <cstdio>
@@ -30,6 +28,7 @@
 #include <random>
 #include <string>
 
+#include "bench/page_cache.h"
 #include "bench/tiles/needed_tiles.h"
 #include "core/base/clock.h"
 #include "core/format/global/open_global.h"
@@ -115,15 +114,9 @@ std::vector<View> views_of_file(const DagView& dag, const voxdag_reader::File& f
 }
 
 // Prints views as lines of a file VIEWS.
-void print_cameras(const std::vector<View>& views, const DagView& dag,
-                   const voxdag_reader::File& file) {
-  const double scale = file.edge() / static_cast<double>(dag.resolution());
+void print_cameras(const std::vector<View>& views, const voxdag_reader::File& file) {
   for (const auto& [name, placement] : views) {
-    double eye[3], target[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      eye[axis] = file.origin()[axis] + placement.eye[axis] * scale;
-      target[axis] = file.origin()[axis] + placement.target[axis] * scale;
-    }
+    const auto eye = world_point(placement.eye, file), target = world_point(placement.target, file);
     std::printf("%s --camera %.9g,%.9g,%.9g --target %.9g,%.9g,%.9g --fov %.9g\n", name.c_str(),
                 eye[0], eye[1], eye[2], target[0], target[1], target[2], placement.fov_degrees);
   }
@@ -135,18 +128,12 @@ void print(uint32_t depth, const char* what, size_t tiles, const Bytes& bytes) {
   std::fflush(stdout);
 }
 
-void forget(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY);
-  posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
-  ::close(fd);
-}
-
 // Encodes all the tiles in random order, and prints their sizes and the speed.
 void time_tiles(const std::string& path, uint32_t depth, const Addresses& tiles) {
   std::vector<TileAddress> order;
   for (const auto& [level, offset] : tiles) order.push_back({level, offset});
   std::shuffle(order.begin(), order.end(), std::mt19937_64(1));
-  forget(path);
+  drop_from_page_cache(path);
   const auto file = open_global_file(path);
   const DagView dag(*file);
   const CheckedBlocks blocks(*file);
@@ -199,7 +186,7 @@ void run(const std::string& path, int width, int height) {
     const auto file = open_global_file(path);
     const DagView dag(*file);
     const auto views = views_of(dag, static_cast<double>(width) / height, width, height);
-    print_cameras(views, dag, *file);
+    print_cameras(views, *file);
     const auto first = NeededTiles(dag, kFirstPixels).find(views[0].placement, width, height);
     for (uint32_t depth = 1; depth <= kMaxTileLevels; ++depth)
       print(depth, "first picture", first[depth].size(), bytes_of(dag, depth, first[depth]));
