@@ -28,8 +28,8 @@ class NearestFinder {
   NearestFinder(const DagView& dag, uint32_t grid_levels) : dag_(dag), grid_levels_(grid_levels) {
     contents_[0] = dag.root();
   }
-  // Like find_nearest(). The distance is at most `reach` on each axis. `from` is inside of the
-  // grid.
+  // Like find_nearest(), if there is a set cell at a distance of at most `reach` on each axis.
+  // `from` is inside of the grid.
   Nearest find(const Position& from, uint32_t reach);
 
  private:

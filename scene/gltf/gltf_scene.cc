@@ -10,7 +10,6 @@
 #include "core/base/integers.h"
 #include "scene/gltf/document/check_document.h"
 #include "scene/gltf/document/read_document.h"
-#include "scene/gltf/extensions/extension_info.h"
 #include "scene/gltf/materials/document_materials.h"
 #include "scene/gltf/materials/image_sources.h"
 #include "scene/gltf/mesh_data/draco_counts.h"
@@ -131,13 +130,7 @@ class GltfScene : public TriangleSource {
     return all;
   }
   UsedOptions used_options() const override {
-    UsedOptions used;
-    for (const std::string& name : options_.ignored_extensions)
-      if (std::ranges::find(document_.extensions_required, name) !=
-              document_.extensions_required.end() &&
-          extension_info(name).support == ExtensionSupport::kUnknown)
-        used.ignored_extensions.push_back(name);
-    return used;
+    return {.ignored_extensions = document_.ignored_extensions};
   }
   std::vector<Warning> warnings() const override { return warnings_.list(); }
 

@@ -181,6 +181,8 @@ struct Document {
   Asset asset;
   std::deque<std::string> extensions_used;
   std::deque<std::string> extensions_required;
+  // Required extensions that are not read, because the user has asked to ignore them.
+  std::vector<std::string> ignored_extensions;
   // Materials, textures, samplers and images, as read by tinygltf. The model's other arrays are
   // empty. The model has no image data: a data: URI in it ends at the comma.
   std::shared_ptr<tinygltf::Model> model;

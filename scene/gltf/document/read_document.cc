@@ -32,6 +32,7 @@ void check_extensions(Document& d, const std::vector<std::string>& ignored) {
                          ", which voxdag does not read; " + option_text("ignore_extension") +
                          " reads the file without it");
     warn("ignored-extension", extension + " is ignored on request");
+    d.ignored_extensions.push_back(name);
   }
   for (const std::string& name : d.extensions_used)
     if (extension_info(name).support == ExtensionSupport::kUnknown &&

@@ -23,7 +23,6 @@ class UnusedOptions : public CommandLine {
 
 TEST_F(UnusedOptions, AreRefusedIfTheyNeedAnotherOption) {
   const Arguments build = {"build", "m.glb", "-r", "64", "-o", "x.vdag"},
-                  plan = {"plan", "m.glb", "-r", "64"},
                   edit = {"edit", "m.vdag", "--cut", "box:0,0,0,1,1,1", "-o", "x.vdag"},
                   combine = {"combine", "m.vdag", "--union", "m.vdag", "-o", "x.vdag"},
                   depth = {"render", "m.vdag", "--depth", "x.npy"}, verify = {"verify", "m.vdag"},
