@@ -158,6 +158,7 @@ class Combination {
       join.add_level(level, *joined[level]);
       progress_.advance(a_.level(level).node_count + b_.level(level).node_count);
     }
+    join.finish();
     progress_.end_stage();
     return joined;
   }

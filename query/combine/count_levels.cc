@@ -72,11 +72,13 @@ void CountLevels::add_nodes(DagInput& input, uint32_t level, CountedNodes& nodes
   nodes.uses.begin();
   for_each([&](const LevelCursor& cursor) {
     OctreeCounts counts{1, 0};
-    if (!lookups)
+    if (!lookups) {
       counts.voxels = static_cast<uint64_t>(popcount64(cursor.brick()));
-    else
+    } else {
+      lookups->visit(cursor);
       for (int i = 0; i < child_count(cursor); ++i)
         counts += lookups->next(cursor.node().child(i)).value;
+    }
     below->add(cursor.offset(), counts);
     for (; !nodes.uses.at_end() && nodes.uses.front().offset == cursor.offset(); nodes.uses.pop()) {
       const auto sign = static_cast<uint64_t>(nodes.uses.front().sign);

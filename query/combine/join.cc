@@ -11,9 +11,7 @@
 namespace voxdag::query {
 
 // The hash of a node of the first file.
-struct HashOfA {
-  uint64_t hash = 0;
-};
+using HashOfA = uint64_t;
 // The hash of a node of the second file. `number_in_a` is 1 plus the word offset of the equal node
 // of the first file, or 0 if the first file has no such node.
 struct HashOfB {
@@ -23,8 +21,8 @@ struct HashOfB {
 
 namespace {
 
-uint64_t number_in_a(const HashOfA&, uint64_t offset) { return offset + 1; }
-uint64_t number_in_a(const HashOfB& node, uint64_t) { return node.number_in_a; }
+uint64_t hash_of(HashOfA hash) { return hash; }
+uint64_t hash_of(const HashOfB& node) { return node.hash; }
 
 // Visits the nodes of a level in the order of the file, and computes their hashes. `Hash` is
 // HashOfA for the first file and HashOfB for the second.
@@ -45,17 +43,22 @@ class HashCursor {
 
   bool at_end() const { return cursor_.at_end(); }
   uint64_t offset() const { return cursor_.offset(); }
-  uint64_t hash() const { return own().hash; }
+  uint64_t hash() const { return hash_; }
   bool is_full() const { return is_full_; }
   // True if the first file has an equal node for each child of the current node. Otherwise the
   // first file cannot have a node equal to the current node.
   bool is_comparable() const { return is_comparable_; }
   // Returns the current node as a Row (result_rows.h) with the offsets that its children have in
   // the first file. Requires is_comparable().
-  const Row& row() const { return kIsA ? own() : joined_; }
+  Row row() const {
+    Row row = row_of(words_, hash_);
+    if (!kIsA && lookups_)
+      for (uint32_t i = 0; i < row.count; ++i) row.children[i] = numbers_in_a_[i] - 1;
+    return row;
+  }
   void next() {
-    has_previous_ = true;
-    current_ ^= 1;
+    previous_words_ = words_;
+    previous_hash_ = hash_;
     cursor_.next();
     load();
   }
@@ -63,7 +66,17 @@ class HashCursor {
  private:
   static constexpr bool kIsA = std::is_same_v<Hash, HashOfA>;
 
-  const Row& own() const { return rows_[current_]; }
+  // Returns the node or the brick at `words`, with its children's offsets in the visited file.
+  Row row_of(const uint32_t* words, uint64_t hash) const {
+    if (!lookups_) return {hash, 0, 1, {brick_at(words)}};
+    const voxdag_reader::Node node{words[0], words + 1, cursor_.is_wide()};
+    Row row{hash, node.child_mask, kPopcount8[node.child_mask], {}};
+    for (uint32_t i = 0; i < row.count; ++i) row.children[i] = node.child(static_cast<int>(i));
+    return row;
+  }
+  static uint64_t brick_at(const uint32_t* words) {
+    return words[0] | static_cast<uint64_t>(words[1]) << 32;
+  }
   void announce() {
     if (!lookups_->needs_announcement()) return;
     for (LevelCursor all(input_, level_); !all.at_end(); all.next())
@@ -73,20 +86,24 @@ class HashCursor {
   }
   void load() {
     if (at_end()) return;
+    words_ = cursor_.words().data();
     if (lookups_)
       load_node();
     else
       load_brick();
-    if (has_previous_ && compare_rows(rows_[current_ ^ 1], own()) >= 0)
-      input_.corrupt(
-          level_, offset(),
-          "the node does not follow the one before it: expected the total order of nodes "
-          "(docs/format.md)");
+    if (previous_words_ && previous_hash_ >= hash_) expect_order();
+  }
+  void expect_order() const {
+    if (compare_rows(row_of(previous_words_, previous_hash_), row_of(words_, hash_)) < 0) return;
+    input_.corrupt(level_, offset(),
+                   "the node does not follow the one before it: expected the total order of nodes "
+                   "(docs/format.md)");
   }
   void load_brick() {
-    rows_[current_] = joined_ = brick_row(cursor_.brick(), input_.file().hash_bits());
+    const uint64_t brick = cursor_.brick();
+    hash_ = truncate_hash(hash_brick(brick), input_.file().hash_bits());
     is_comparable_ = true;
-    is_full_ = cursor_.brick() == ~uint64_t{0};
+    is_full_ = brick == ~uint64_t{0};
   }
   void load_node();
 
@@ -95,11 +112,11 @@ class HashCursor {
   const uint64_t full_below_;
   LevelCursor cursor_;
   std::optional<NodeLookups<NodeValues<Hash>>> lookups_;
-  // The current node and the node before it, with their children's offsets in the visited file.
-  Row rows_[2];
-  int current_ = 0;
-  bool has_previous_ = false;
-  Row joined_;  // the result of row() for the second file
+  const uint32_t* words_ = nullptr;  // of the current node
+  uint64_t hash_ = 0;
+  uint64_t numbers_in_a_[8] = {};             // of the children of a node of the second file
+  const uint32_t* previous_words_ = nullptr;  // of the node before the current one, if any
+  uint64_t previous_hash_ = 0;
   bool is_comparable_ = false;
   bool is_full_ = false;
 };
@@ -107,28 +124,33 @@ class HashCursor {
 template <class Hash>
 void HashCursor<Hash>::load_node() {
   const voxdag_reader::Node& node = cursor_.node();
-  lookups_->prefetch(cursor_.words_ahead());
-  Row& own = rows_[current_];
-  own.mask = joined_.mask = node.child_mask;
-  own.count = joined_.count = kPopcount8[node.child_mask];
-  is_comparable_ = true;
-  is_full_ = node.child_mask == 255;
-  uint64_t hashes[8];
-  for (uint32_t i = 0; i < own.count; ++i) {
-    const uint64_t child = node.child(static_cast<int>(i));
+  lookups_->visit(cursor_);
+  const int count = kPopcount8[node.child_mask];
+  bool is_comparable = true, is_full = node.child_mask == 255;
+  uint64_t hash = node_hash_begin(node.child_mask);
+  for (int i = 0; i < count; ++i) {
+    const uint64_t child = node.child(i);
     const FoundValue<Hash> found = lookups_->next(child);
     if (!found.begins)
       input_.corrupt(level_, offset(),
                      "a child pointer leads to a word at which no node begins: expected a node");
-    const uint64_t number = number_in_a(found.value, child);
-    hashes[i] = found.value.hash;
-    own.children[i] = child;
-    if (!kIsA) joined_.children[i] = number - 1;
-    is_comparable_ = is_comparable_ && number != 0;
-    is_full_ = is_full_ && child == full_below_;
+    hash = node_hash_add(hash, hash_of(found.value));
+    if constexpr (!kIsA) {
+      numbers_in_a_[i] = found.value.number_in_a;
+      is_comparable = is_comparable && numbers_in_a_[i] != 0;
+    }
+    is_full = is_full && child == full_below_;
   }
-  own.hash = joined_.hash = truncate_hash(
-      hash_node(node.child_mask, static_cast<int>(own.count), hashes), input_.file().hash_bits());
+  hash_ = truncate_hash(node_hash_end(hash), input_.file().hash_bits());
+  is_comparable_ = is_comparable;
+  is_full_ = is_full;
+}
+
+// Returns a negative number if the node of `a` is before the node of `b` in the total order, 0 if
+// the nodes are equal, otherwise a positive number. Requires b.is_comparable().
+int compare(const HashCursor<HashOfA>& a, const HashCursor<HashOfB>& b) {
+  if (a.hash() != b.hash()) return a.hash() < b.hash() ? -1 : 1;
+  return compare_rows(a.row(), b.row());
 }
 
 }  // namespace
@@ -136,7 +158,10 @@ void HashCursor<Hash>::load_node() {
 struct Join::Below {
   NodeValues<HashOfA> a;
   NodeValues<HashOfB> b;
-  NodePair full;
+  JoinedLevel& joined;
+  // If the hashes of the nodes of the first file and the list of these hashes are both in memory,
+  // the list is made from them when they are no longer looked up.
+  bool shares_hashes;
 };
 
 Join::Join(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory& memory)
@@ -144,25 +169,28 @@ Join::Join(DagInput& a, DagInput& b, const SpillSpace& space, const LookupMemory
 Join::~Join() = default;
 
 void Join::add_level(uint32_t level, JoinedLevel& joined) {
-  auto done = std::unique_ptr<Below>(new Below{{space_, a_.level(level), memory_.value_bytes},
-                                               {space_, b_.level(level), memory_.value_bytes},
-                                               {}});
-  const NodePair full_below = below_ ? below_->full : NodePair();
+  NodeValues<HashOfA> hashes_a(space_, a_.level(level), memory_.value_bytes);
+  const bool shares_hashes =
+      hashes_a.is_resident() && joined.hashes_a.has_room(a_.level(level).node_count);
+  auto done = std::unique_ptr<Below>(new Below{
+      std::move(hashes_a), {space_, b_.level(level), memory_.value_bytes}, joined, shares_hashes});
+  const NodePair full_below = below_ ? below_->joined.full : NodePair();
   HashCursor a(a_, level, below_ ? &below_->a : nullptr, full_below.a, space_,
                memory_.window_bytes);
   HashCursor b(b_, level, below_ ? &below_->b : nullptr, full_below.b, space_,
                memory_.window_bytes);
   const auto pass_a = [&] {
-    done->a.add(a.offset(), {a.hash()});
-    joined.hashes_a.add(a.hash());
+    done->a.add(a.offset(), a.hash());
+    if (!shares_hashes) joined.hashes_a.add(a.hash());
     if (a.is_full()) joined.full.a = a.offset();
     a.next();
   };
   for (; !b.at_end(); b.next()) {
     bool is_equal = false;
     if (b.is_comparable()) {
-      while (!a.at_end() && compare_rows(a.row(), b.row()) < 0) pass_a();
-      is_equal = !a.at_end() && compare_rows(a.row(), b.row()) == 0;
+      int order = 1;
+      while (!a.at_end() && (order = compare(a, b)) < 0) pass_a();
+      is_equal = !a.at_end() && order == 0;
     }
     if (is_equal) joined.equal.add({a.offset(), b.offset()});
     done->b.add(b.offset(), {b.hash(), is_equal ? a.offset() + 1 : 0});
@@ -172,11 +200,17 @@ void Join::add_level(uint32_t level, JoinedLevel& joined) {
   while (!a.at_end()) pass_a();
   done->a.finish();
   done->b.finish();
-  joined.hashes_a.finish();
   joined.hashes_b.finish();
   joined.equal.finish();
+  finish();
   below_ = std::move(done);
-  below_->full = joined.full;
+}
+
+void Join::finish() {
+  if (!below_) return;
+  if (below_->shares_hashes) below_->joined.hashes_a.adopt(below_->a.take_values());
+  below_->joined.hashes_a.finish();
+  below_.reset();
 }
 
 }  // namespace voxdag::query

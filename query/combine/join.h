@@ -46,8 +46,11 @@ class Join {
   ~Join();
 
   // Hashes the nodes of one level of both files and finds the equal nodes. Stores the results in
-  // `joined`. Call it for each level, from the bricks up.
+  // `joined`; joined.hashes_a is complete after the next call. Call it for each level, from the
+  // bricks up.
   void add_level(uint32_t level, JoinedLevel& joined);
+  // Must be called after the last level.
+  void finish();
 
  private:
   struct Below;

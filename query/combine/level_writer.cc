@@ -65,7 +65,7 @@ class KeptCursor {
       row_.children[0] = cursor_->brick();
       return;
     }
-    lookups_->prefetch(cursor_->words_ahead());
+    lookups_->visit(*cursor_);
     const voxdag_reader::Node& node = cursor_->node();
     row_.mask = node.child_mask;
     row_.count = kPopcount8[node.child_mask];

@@ -122,8 +122,8 @@ void PairLevels::mark_children(DagInput& input, uint32_t level, const Marks& mar
   if (marks.empty()) return;
   for (LevelCursor cursor(input, level); !cursor.at_end(); cursor.next()) {
     if (!marks.has(cursor.offset())) continue;
-    for (int i = 0; i < kPopcount8[cursor.node().child_mask]; ++i)
-      below.mark(cursor.node().child(i));
+    const voxdag_reader::Node& node = cursor.node();
+    for (int i = 0, count = kPopcount8[node.child_mask]; i < count; ++i) below.mark(node.child(i));
   }
 }
 

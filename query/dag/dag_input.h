@@ -126,26 +126,25 @@ class LevelCursor {
     ++count_;
     load();
   }
-  // Returns some words of the level that are kWordsAhead words after the beginning of the current
-  // node. Most of them are pointers in nodes that next() will reach soon, so the caller can
-  // prefetch the data of the nodes to which they point. Returns no words if the words are not
-  // verified yet, if the level has bricks, or if its nodes have 64-bit pointers.
-  std::span<const uint32_t> words_ahead() const {
-    const uint64_t first = offset_ + kWordsAhead;
-    if (wide_ || is_brick_level_ || first + size_ > checked_) return {};
-    return {words_.words + first, size_};
-  }
+  // True if the nodes of the level have 64-bit pointers.
+  bool is_wide() const { return wide_; }
+  // Returns the words of the level, from its beginning, whose checksums are verified. They include
+  // the current node.
+  std::span<const uint32_t> verified_words() const { return {words_.words, checked_}; }
 
  private:
   static constexpr uint64_t kChunkWords = uint64_t{1} << 16;
-  static constexpr uint64_t kWordsAhead = 96;
 
   void load() {
     if (at_end()) return expect_all_nodes();
     if (offset_ + global_layout::kMaxNodeWords > checked_) check_chunk();
     if (is_brick_level_) return load_brick();
-    node_ = input_.file_.node(level_, offset_);
-    size_ = 1 + (static_cast<uint64_t>(kPopcount8[node_.child_mask]) << wide_);
+    const uint32_t* const words = words_.words + offset_;
+    const uint32_t mask = words[0];
+    size_ = 1 + (static_cast<uint64_t>(popcount8(mask)) << wide_);
+    if (mask == 0 || mask > 255 || size_ > words_.word_count - offset_)
+      input_.file_.node(level_, offset_);  // throws
+    node_ = {mask, words + 1, wide_};
   }
   void load_brick() {
     size_ = 2;

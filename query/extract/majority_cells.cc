@@ -46,7 +46,7 @@ class VoxelCursor {
   // because the lookups are sequential.
   uint64_t voxels() {
     if (!lookups_) return static_cast<uint64_t>(popcount64(cursor_.brick()));
-    lookups_->prefetch(cursor_.words_ahead());
+    lookups_->visit(cursor_);
     const voxdag_reader::Node& node = cursor_.node();
     uint64_t sum = 0;
     for (int i = 0; i < kPopcount8[node.child_mask]; ++i) {

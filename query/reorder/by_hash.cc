@@ -54,7 +54,7 @@ class RowMaker {
   }
   Row node_row(const LevelCursor& nodes) {
     const voxdag_reader::Node& node = nodes.node();
-    lookups_->prefetch(nodes.words_ahead());
+    lookups_->visit(nodes);
     Row row;
     row.mask = node.child_mask;
     row.count = kPopcount8[node.child_mask];

@@ -54,16 +54,18 @@ class KeptPlaces {
     if (offsets_) offsets_->finish();
   }
 
-  // at() returns the new offset of the node at a word of the file, or any value if there is no such
-  // node, and prefetch() loads its cache line. Both require is_resident().
+  // The steps of a lookup in memory, as in NodeValues. The index of an offset is the offset. at()
+  // can return any value if no node begins at the offset. Require is_resident().
+  static constexpr bool kIsLocated = false;
+  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
+    if (offset < level_words_) __builtin_prefetch(&shifts_[offset / kBlockWords]);
+  }
+  uint64_t locate(uint64_t offset) const { return offset; }
   FoundValue<uint64_t> at(uint64_t offset) const {
     if (offset >= level_words_) return {};
     int64_t shift = shifts_[offset / kBlockWords];
     shift = shift % 2 == 0 ? shift / 2 : slot_shifts_[slot_of(shift, offset)];
     return {offset + static_cast<uint64_t>(shift), 1};
-  }
-  VOXDAG_PREFETCH void prefetch(uint64_t offset) const {
-    if (offset < level_words_) __builtin_prefetch(&shifts_[offset / kBlockWords]);
   }
 
   static FoundValue<uint64_t> found(uint64_t offset, const Slot& slot) {

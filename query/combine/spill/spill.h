@@ -87,6 +87,11 @@ class GrowingItems {
     buffer_[count_++] = item;
     return true;
   }
+  // Replaces all items by those of `buffer`.
+  void adopt(PageBuffer<T> buffer) {
+    buffer_ = std::move(buffer);
+    count_ = buffer_.size();
+  }
   void clear() { count_ = 0; }
   void free() {
     buffer_ = {};
@@ -121,6 +126,10 @@ class SpillList {
     flush();
     items_.try_add(item, max, space_->budget);
   }
+  // True if the list can have `count` items in memory.
+  bool has_room(uint64_t count) const { return count <= spill_items<T>(space_->list_bytes); }
+  // Replaces all items by those of `items`. Requires has_room(items.size()).
+  void adopt(PageBuffer<T> items) { items_.adopt(std::move(items)); }
   // Completes the list. Must be called after the last item was added, before the list is read.
   void finish() {
     if (!file_) return;
