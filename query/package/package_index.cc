@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "voxdag package";
 constexpr size_t kDigestDigits = 32;
-constexpr uint64_t kVersion = 2;  // version 1 has no head
+constexpr uint64_t kVersion = 3;
 // Maximum depth of nested values in package.json. Formatting nested JSON recurses, so a greater
 // depth could overflow the stack.
 constexpr int kMaxDepth = 32;
@@ -55,17 +55,17 @@ class Parser {
     expect(json.is_object() && json.value("format", Json()) == kFormat, "'format'",
            std::string("'") + kFormat + "'");
     const Json version = json.value("version", Json());
-    if (version != 1 && version != kVersion)
+    if (version != kVersion)
       throw Error(ErrorCode::kUnsupportedVersion,
                   path_ + ": it has version " + exact_json_text(version) +
-                      " of the format, expected version 1 or " + std::to_string(kVersion));
+                      " of the format, expected version " + std::to_string(kVersion) +
+                      "; publish the file again");
     PackageIndex index;
     const Json& manifest = member(json, "manifest");
     expect(manifest.is_object(), "'manifest'", "an object");
     index.manifest = exact_json_text(manifest);
     for (const Json& band : list(json, "bands")) index.bands.push_back(band_of(band));
     expect(index.bands.size() <= kMaxBands, "'bands'", "at most two bands of each level");
-    expect(version == kVersion || !json.contains("head"), "'head'", "no head in version 1");
     if (json.contains("head")) index.head = head_of(json["head"]);
     const Json& directory = member(json, "directory");
     index.directory = file_of(directory);

@@ -33,16 +33,21 @@ class Columns {
     left_.remove_prefix(count);
     return column;
   }
-  // Reads `count` numbers of `bytes` bytes each. Byte i of all numbers is in one column. The first
-  // column has the lowest bytes.
-  std::vector<uint64_t> take_numbers(size_t bytes, size_t count) {
-    std::vector<uint64_t> numbers(count);
-    for (size_t byte = 0; byte < bytes; ++byte) {
-      const std::string_view column = take(count);
-      for (size_t i = 0; i < count; ++i)
-        numbers[i] |= uint64_t{static_cast<unsigned char>(column[i])} << 8 * byte;
+  uint8_t take_byte() { return static_cast<uint8_t>(take(1).front()); }
+  uint32_t take_word() {
+    uint32_t word;
+    std::memcpy(&word, take(sizeof word).data(), sizeof word);
+    return word;
+  }
+  // Reads the mask of a leaf.
+  uint64_t take_mask() {
+    uint64_t mask = 0;
+    for (uint32_t left = take_byte(); left != 0; left &= left - 1) {
+      const uint64_t byte = take_byte();
+      if (byte == 0) refuse_block("a stored byte of a leaf is 0, expected another value");
+      mask |= byte << 8 * std::countr_zero(left);
     }
-    return numbers;
+    return mask;
   }
   void expect_end() const {
     if (!left_.empty()) refuse_block("bytes follow after the last column, expected none");
@@ -151,25 +156,24 @@ size_t children_of(std::string_view masks) {
 void read_references(Columns& columns, std::vector<Leaf>& leaves, uint32_t& next) {
   const std::string_view is_old = columns.take((leaves.size() + 7) / 8);
   const auto old = [&](size_t i) { return is_old[i / 8] >> i % 8 & 1; };
-  size_t old_count = 0;
-  for (size_t i = 0; i < leaves.size(); ++i) old_count += static_cast<size_t>(old(i));
   for (size_t i = leaves.size(); i < 8 * is_old.size(); ++i)
     if (old(i)) refuse_block("a reference follows after the last leaf, expected none");
-  const std::vector<uint64_t> distances = columns.take_numbers(4, old_count);
-  size_t at = 0;
   for (size_t i = 0; i < leaves.size(); ++i) {
     if (old(i)) {
-      const uint64_t distance = distances[at++];
-      if (distance == 0 || distance > next)
-        refuse_block("leaf " + std::to_string(i) +
-                     " refers to no earlier tile: expected a distance from 1 to " +
+      leaves[i].number = columns.take_word();
+      if (leaves[i].number >= next)
+        refuse_block("leaf " + std::to_string(i) + " refers to the tile " +
+                     std::to_string(leaves[i].number) + ", expected a number below " +
                      std::to_string(next));
-      leaves[i].number = next - static_cast<uint32_t>(distance);
     } else {
       leaves[i].number = next++;
       if (next == 0) refuse_block("the numbers of its tiles exceed 32 bits, expected fewer tiles");
     }
   }
+}
+
+void append_word(std::string& bytes, uint32_t word) {
+  bytes.append(reinterpret_cast<const char*>(&word), sizeof word);
 }
 
 }  // namespace
@@ -192,33 +196,36 @@ void TileBlockEncoder::add(const std::vector<uint32_t>& tile) {
 void TileBlockEncoder::add_leaf(const std::vector<uint32_t>& tile, size_t leaf) {
   const bool bricks = has_bricks(tile);
   const size_t at = leaves_begin(tile) + leaf * (bricks ? 2 : 4), mask = bricks ? at : at + 2;
-  for (size_t byte = 0; byte < bricks_.size(); ++byte)
-    bricks_[byte].push_back(static_cast<char>(tile[mask + byte / 4] >> 8 * (byte % 4)));
+  const size_t present = leaves_.size();
+  leaves_.push_back(0);
+  for (size_t byte = 0; byte < sizeof(uint64_t); ++byte) {
+    const auto value = static_cast<char>(tile[mask + byte / 4] >> 8 * (byte % 4));
+    if (value == 0) continue;
+    leaves_[present] = static_cast<char>(leaves_[present] | 1 << byte);
+    leaves_.push_back(value);
+  }
   if (!bricks) {
     has_references_ = true;
     const uint32_t number = tile[at];
     if (number == next_) {
       ++next_;
     } else {
-      set_bit(is_old_, leaves_);
-      for (size_t byte = 0; byte < old_.size(); ++byte)
-        old_[byte].push_back(static_cast<char>((next_ - number) >> 8 * byte));
+      set_bit(is_old_, leaf_count_);
+      append_word(old_, number);
     }
   }
-  ++leaves_;
+  ++leaf_count_;
 }
 
 std::string TileBlockEncoder::finish() const {
-  std::string bytes(sizeof first_, '\0');
-  std::memcpy(bytes.data(), &first_, sizeof first_);
+  std::string bytes;
+  append_word(bytes, first_);
   for (const std::string& column : masks_) bytes += column;
-  for (const std::string& column : bricks_) bytes += column;
+  bytes += leaves_;
   if (!has_references_) return bytes;
   std::string bits = is_old_;
-  bits.resize((leaves_ + 7) / 8, '\0');
-  bytes += bits;
-  for (const std::string& column : old_) bytes += column;
-  return bytes;
+  bits.resize((leaf_count_ + 7) / 8, '\0');
+  return bytes + bits + old_;
 }
 
 TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32_t level,
@@ -227,8 +234,7 @@ TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32
   const bool bricks = end + kBrickLevels == grid_levels;
   Columns columns(bytes);
   TileBlock block;
-  std::memcpy(&block.first, columns.take(sizeof block.first).data(), sizeof block.first);
-  block.next = block.first;
+  block.first = block.next = columns.take_word();
   std::vector<std::string_view> masks;
   size_t nodes = count;
   for (uint32_t i = 0; i < levels; ++i) {
@@ -236,7 +242,8 @@ TileBlock decode_tile_block(std::string_view bytes, uint32_t grid_levels, uint32
     nodes = children_of(masks.back());
   }
   std::vector<Leaf> leaves;
-  for (const uint64_t mask : columns.take_numbers(8, nodes)) {
+  for (size_t i = 0; i < nodes; ++i) {
+    const uint64_t mask = columns.take_mask();
     if (mask == 0) refuse_block("a leaf has no cells, expected at least one");
     leaves.push_back({mask, 0});
   }

@@ -34,13 +34,11 @@ class TileBlockEncoder {
 
   uint32_t first_, next_;
   std::array<std::string, kPackageTileLevels> masks_;  // child masks, by level of the tile
-  std::array<std::string, 8> bricks_;                  // bricks_[i] has byte i of all leaves' masks
+  std::string leaves_;                                 // the masks of all leaves
+  size_t leaf_count_ = 0;
   bool has_references_ = false;
-  size_t leaves_ = 0;
   std::string is_old_;  // one bit per leaf: 1 if an earlier leaf of the band has the same number
-  // For each leaf with a 1 in is_old_, the value of next_ when the leaf was added, minus the leaf's
-  // number. old_[i] has byte i of all these differences.
-  std::array<std::string, 4> old_;
+  std::string old_;     // the numbers of the leaves with a 1 in is_old_
 };
 
 // The tiles of a block.

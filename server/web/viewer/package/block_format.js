@@ -2,7 +2,6 @@
 // may be damaged. All counts in them are checked, so a damaged block causes an error.
 
 const kTileMagic = 0x31544456;
-const kReferenceBytes = 4;
 
 const kPopcount = Uint8Array.from({length: 256}, (_, i) => {
   let bits = 0;
@@ -21,15 +20,27 @@ class Columns {
     this.at += count;
     return this.bytes.subarray(this.at - count, this.at);
   }
-  // Reads `count` numbers of 32 bits from four columns of bytes. The first column has the lowest
-  // byte of each number.
-  takeWords(count) {
-    const words = new Uint32Array(count);
-    for (let byte = 0; byte < kReferenceBytes; ++byte) {
-      const column = this.take(count);
-      for (let i = 0; i < count; ++i) words[i] |= column[i] << 8 * byte;
+  takeWord() {
+    const bytes = this.take(4);
+    return (bytes[0] | bytes[1] << 8 | bytes[2] << 16 | bytes[3] << 24) >>> 0;
+  }
+  // Reads the masks of `count` leaves. The first byte of a leaf tells which bytes of its mask are
+  // stored; the other bytes are 0. Returns the low and the high halves of the masks.
+  takeMasks(count) {
+    const {bytes} = this, low = new Uint32Array(count), high = new Uint32Array(count);
+    let at = this.at;
+    for (let i = 0; i < count; ++i) {
+      const stored = bytes[at++];
+      if (stored === 0) throw new Error("A block has a leaf without cells.");
+      for (let byte = 0; byte < 4; ++byte) {
+        if (stored >>> byte & 1) low[i] |= bytes[at++] << 8 * byte;
+      }
+      for (let byte = 0; byte < 4; ++byte) {
+        if (stored >>> 4 + byte & 1) high[i] |= bytes[at++] << 8 * byte;
+      }
     }
-    return words;
+    this.take(at - this.at);
+    return {low, high};
   }
   expectEnd() {
     if (this.at !== this.bytes.length) throw new Error("A block has bytes after its columns.");
@@ -42,7 +53,7 @@ export class TileBlock {
   // `bytes` is the decompressed block. `level` is the level of the roots of the tiles. The third
   // argument is the tileShape() of this level. `count` is the number of tiles.
   constructor(bytes, level, {levels, bricks}, count) {
-    const columns = new Columns(bytes), head = columns.take(4);
+    const columns = new Columns(bytes), next = columns.takeWord();
     Object.assign(this, {level, levels, bricks, count});
     this.size = bytes.length;
     this.masks = [];  // by level of the tiles: the child masks of all nodes
@@ -58,9 +69,7 @@ export class TileBlock {
     }
     this.starts.push(starts);
     const leaves = starts[count];
-    this.low = columns.takeWords(leaves);
-    this.high = columns.takeWords(leaves);
-    const next = new DataView(head.buffer, head.byteOffset).getUint32(0, true);
+    Object.assign(this, columns.takeMasks(leaves));
     this.numbers = bricks ? null : readNumbers(columns, leaves, next);
     columns.expectEnd();
   }
@@ -144,21 +153,13 @@ function childStarts(masks, starts) {
 
 // Returns, for each leaf of a block, the number of the tile to which it refers. All leaves are
 // cut-off nodes. A leaf either refers to the next new tile number, or has an old reference: a
-// stored distance to an earlier number. `next` is the first new number.
+// smaller number, which is stored. `next` is the first new number.
 function readNumbers(columns, count, next) {
   const old = columns.take(Math.ceil(count / 8)), numbers = new Uint32Array(count);
   const isOld = (i) => old[i >>> 3] >>> (i & 7) & 1;
-  let oldCount = 0;
-  for (let i = 0; i < count; ++i) oldCount += isOld(i);
-  const distances = columns.takeWords(oldCount);
-  for (let i = 0, at = 0; i < count; ++i) {
-    if (!isOld(i)) {
-      numbers[i] = next++;
-      continue;
-    }
-    if (distances[at] === 0 || distances[at] > next)
-      throw new Error("A block refers to a tile that does not exist.");
-    numbers[i] = next - distances[at++];
+  for (let i = 0; i < count; ++i) {
+    numbers[i] = isOld(i) ? columns.takeWord() : next++;
+    if (numbers[i] >= next) throw new Error("A block refers to a tile that does not exist.");
   }
   return numbers;
 }

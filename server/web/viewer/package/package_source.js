@@ -11,7 +11,7 @@ import {Directory} from "./directory.js";
 import {PromiseCache} from "./promise_cache.js";
 import {Segments} from "./segments.js";
 
-const kFormat = "voxdag package", kVersions = [1, 2];
+const kFormat = "voxdag package", kVersion = 3;
 const kBlockTiles = 64;
 const kMaxCachedBytes = 32 << 20;  // limit for decompressed blocks in memory
 const kMaxTileBatches = 2, kMaxBatchTiles = 512;
@@ -72,8 +72,8 @@ export class PackageSource {
     return this.info;
   }
 
-  // Begins to load the head and the first page of the directory, because every view needs them. In
-  // a package of version 1, loads the first pack instead of the head.
+  // Begins to load the head and the first page of the directory, because every view needs them.
+  // Without a head, loads the first pack instead.
   warmUp() {
     const file = this.directory.head ?? this.packs[0];
     if (file) this.files.read(file, 0, file.bytes).catch(() => {});
@@ -91,9 +91,9 @@ export class PackageSource {
 
   async fetchIndex(signal) {
     const index = await this.fetchAnyIndex(signal);
-    if (!kVersions.includes(index?.version))
+    if (index?.version !== kVersion)
       throw new TileError(
-          200, `package.json is not the index of a package of version ${kVersions.join(" or ")}.`);
+          200, `package.json is not the index of a package of version ${kVersion}.`);
     return index;
   }
 
@@ -228,8 +228,7 @@ export class PackageSource {
     try {
       const index = await this.fetchAnyIndex(signal);
       // Later versions can store the digest elsewhere, but their files are others in any case.
-      const isSame =
-          kVersions.includes(index?.version) && index.manifest?.digest === this.info.digest;
+      const isSame = index?.version === kVersion && index.manifest?.digest === this.info.digest;
       if (index && !isSame) this.ended = kReplaced;
       this.lookedMs = performance.now();
     } catch (error) {

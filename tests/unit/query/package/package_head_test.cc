@@ -76,17 +76,6 @@ TEST_F(PackageHead, NamesAMissingBand) {
   EXPECT_THAT(check_error("far"), testing::HasSubstr("the finest tiles refer to"));
 }
 
-// Version 1 has no heads.
-TEST_F(PackageHead, IsRefusedInVersion1) {
-  const QueryFile scene(random_voxels(5, 64));
-  const auto file = open_global_file(scene.path());
-  write(*file, spec_with_head(*file, "p"));
-  auto index = read_index("p");
-  index["version"] = 1;
-  write_index("p", index);
-  EXPECT_THAT(check_error("p"), testing::HasSubstr("no head in version 1"));
-}
-
 TEST_F(PackageHead, NamesDamage) {
   const QueryFile scene(random_voxels(5, 256));
   const auto file = open_global_file(scene.path());
@@ -124,21 +113,19 @@ TEST_F(PackageHead, NamesDamage) {
               testing::HasSubstr("its first new tile has the number"));
 }
 
-// A package of version 1 has no head.
-TEST_F(PackageHead, IsMissingInVersion1) {
+TEST_F(PackageHead, HasTheVersion) {
   const QueryFile scene(random_voxels(7, 64));
   const auto file = open_global_file(scene.path());
   write(*file, spec(*file, "p"));
-  const std::string index = path("p/package.json");
-  std::string text = read_bytes(index);
-  const size_t at = text.find("\"version\":2");
-  ASSERT_NE(at, text.npos);
-  EXPECT_EQ(text.find("head"), text.npos);
-  write_bytes(index, text.replace(at, 11, "\"version\":1"));
-  check("p");
-  write_bytes(index, text.replace(at, 11, "\"version\":3"));
-  EXPECT_THAT(check_error("p"),
-              testing::HasSubstr("it has version 3 of the format, expected version 1 or 2"));
+  auto index = read_index("p");
+  EXPECT_EQ(index.value("version", 0), 3);
+  EXPECT_FALSE(index.contains("head"));
+  for (const int version : {1, 2, 4}) {
+    index["version"] = version;
+    write_index("p", index);
+    EXPECT_THAT(check_error("p"), testing::HasSubstr("it has version " + std::to_string(version) +
+                                                     " of the format, expected version 3"));
+  }
 }
 
 }  // namespace
