@@ -68,15 +68,15 @@ VOXDAG_INLINE FourPlanes<Four> min(FourPlanes<Four> x, FourPlanes<Four> y) {
 template <class Four>
 VOXDAG_INLINE Crossed cross(FourPlanes<Four> in, FourPlanes<Four> out, double t_min, double t_max) {
   const Four first = Four::of(t_min), last = Four::of(t_max);
-  const Four in_yz = max(max(blend_high(middle_lane(in.lower), middle_lane(in.upper)),
+  const Four in_xz = max(max(blend_high(first_lane(in.lower), first_lane(in.upper)),
                              blend_odd(last_lane(in.lower), last_lane(in.upper))),
                          first);
-  const Four out_yz = min(min(blend_high(middle_lane(out.lower), middle_lane(out.upper)),
+  const Four out_xz = min(min(blend_high(first_lane(out.lower), first_lane(out.upper)),
                               blend_odd(last_lane(out.lower), last_lane(out.upper))),
                           last);
-  const Four in0 = max(in_yz, first_lane(in.lower)), in1 = max(in_yz, first_lane(in.upper));
-  const Four out0 = min(out_yz, first_lane(out.lower)), out1 = min(out_yz, first_lane(out.upper));
-  return {less(in0, out0) | less(in1, out1) << 4, equal(in0, out0) | equal(in1, out1) << 4};
+  const Four in0 = max(in_xz, middle_lane(in.lower)), in1 = max(in_xz, middle_lane(in.upper));
+  const Four out0 = min(out_xz, middle_lane(out.lower)), out1 = min(out_xz, middle_lane(out.upper));
+  return {less(in0, out0, in1, out1), equal(in0, out0, in1, out1)};
 }
 
 }  // namespace

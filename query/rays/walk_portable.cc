@@ -28,8 +28,17 @@ VOXDAG_INLINE PlainFour min(PlainFour x, PlainFour y) { return {min(x.a, y.a), m
 VOXDAG_INLINE unsigned less(PlainFour x, PlainFour y) {
   return less(x.a, y.a) | less(x.b, y.b) << 2;
 }
-VOXDAG_INLINE unsigned equal(PlainFour x, PlainFour y) {
-  return equal(x.a, y.a) | equal(x.b, y.b) << 2;
+// Returns the results of two comparisons as a mask of children: `lower` has the results for the
+// children that are lower on the y axis, and `upper` for those that are upper.
+VOXDAG_INLINE uint32_t children(uint32_t lower, uint32_t upper) {
+  return (lower & 3) | (upper & 3) << 2 | (lower & 12) << 2 | (upper & 12) << 4;
+}
+VOXDAG_INLINE uint32_t less(PlainFour x0, PlainFour y0, PlainFour x1, PlainFour y1) {
+  return children(less(x0, y0), less(x1, y1));
+}
+VOXDAG_INLINE uint32_t equal(PlainFour x0, PlainFour y0, PlainFour x1, PlainFour y1) {
+  return children(equal(x0.a, y0.a) | equal(x0.b, y0.b) << 2, equal(x1.a, y1.a) | equal(x1.b, y1.b)
+                                                                                      << 2);
 }
 VOXDAG_INLINE PlainFour first_lane(PlainFour x) { return {firsts(x.a), firsts(x.a)}; }
 VOXDAG_INLINE PlainFour middle_lane(PlainFour x) { return {seconds(x.a), seconds(x.a)}; }

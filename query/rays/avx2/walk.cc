@@ -24,8 +24,18 @@ VOXDAG_INLINE Avx2Four min(Avx2Four x, Avx2Four y) { return {_mm256_min_pd(x.v, 
 VOXDAG_INLINE unsigned less(Avx2Four x, Avx2Four y) {
   return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(x.v, y.v, _CMP_LT_OQ)));
 }
-VOXDAG_INLINE unsigned equal(Avx2Four x, Avx2Four y) {
-  return static_cast<unsigned>(_mm256_movemask_pd(_mm256_cmp_pd(x.v, y.v, _CMP_EQ_OQ)));
+// Returns the results of two comparisons as a mask of children: `lower` has the results for the
+// children that are lower on the y axis, and `upper` for those that are upper.
+VOXDAG_INLINE uint32_t children(__m256d lower, __m256d upper) {
+  const __m256 both =
+      _mm256_shuffle_ps(_mm256_castpd_ps(lower), _mm256_castpd_ps(upper), _MM_SHUFFLE(2, 0, 2, 0));
+  return static_cast<uint32_t>(_mm256_movemask_ps(both));
+}
+VOXDAG_INLINE uint32_t less(Avx2Four x0, Avx2Four y0, Avx2Four x1, Avx2Four y1) {
+  return children(_mm256_cmp_pd(x0.v, y0.v, _CMP_LT_OQ), _mm256_cmp_pd(x1.v, y1.v, _CMP_LT_OQ));
+}
+VOXDAG_INLINE uint32_t equal(Avx2Four x0, Avx2Four y0, Avx2Four x1, Avx2Four y1) {
+  return children(_mm256_cmp_pd(x0.v, y0.v, _CMP_EQ_OQ), _mm256_cmp_pd(x1.v, y1.v, _CMP_EQ_OQ));
 }
 VOXDAG_INLINE Avx2Four first_lane(Avx2Four x) { return {_mm256_permute4x64_pd(x.v, 0x00)}; }
 VOXDAG_INLINE Avx2Four middle_lane(Avx2Four x) { return {_mm256_permute4x64_pd(x.v, 0x55)}; }
