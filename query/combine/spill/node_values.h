@@ -92,7 +92,7 @@ class NodeValues {
            1;
   }
   VOXDAG_PREFETCH void prefetch_value(uint64_t index) const {
-    __builtin_prefetch(values_.data() + index);
+    if (index != kNone) __builtin_prefetch(&values_[index]);
   }
   FoundValue<T> at(uint64_t index) const {
     if (index == kNone) return {};
