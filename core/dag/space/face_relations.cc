@@ -6,7 +6,7 @@
 namespace voxdag {
 namespace {
 
-constexpr uint64_t kMinSlots = uint64_t{1} << 10, kMaxSlots = uint64_t{1} << 15;
+constexpr uint64_t kMinSlots = uint64_t{1} << 10, kMaxSlots = uint64_t{1} << 11;
 constexpr uint64_t kBudgetPart = 32;  // the cache takes at most 1/kBudgetPart of the budget
 
 constexpr uint64_t pair_bit(uint32_t low, uint32_t high) {
