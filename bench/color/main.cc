@@ -122,7 +122,6 @@ void run(uint32_t color_levels) {
   const auto regions = by_region(grid);
   TextureReader textures(image.layout, image.pages.data());
   RegionBaker<TextureReader> baker(grid, {&material, 1}, textures);
-  std::vector<ColoredCell> cells;
   double rule = 1e9, encoding = 1e9;
   uint64_t count = 0, bytes = 0;
   for (int i = 0; i < kRuns; ++i) {
@@ -132,14 +131,18 @@ void run(uint32_t color_levels) {
       if (regions[morton].empty()) continue;
       Cube region{grid.region_level(), {}};
       morton_decode(morton, region.position[0], region.position[1], region.position[2]);
+      RegionEncoder encoder(color_levels - grid.region_level());
       const double start = cpu_seconds();
-      baker.bake(region, regions[morton], cells);
+      baker.begin(region);
+      baker.add(regions[morton]);
       const double middle = cpu_seconds();
       baked += middle - start;
-      if (cells.empty()) continue;
-      count += cells.size();
-      bytes += encode_region(color_levels - grid.region_level(), morton, cells).blocks.size();
+      baker.finish(0, encoder);
+      if (encoder.empty()) continue;
+      const EncodedRegion result = encoder.finish(morton);
       encoded += cpu_seconds() - middle;
+      count += result.counts[0];
+      bytes += result.blocks.size();
     }
     rule = std::min(rule, baked);
     encoding = std::min(encoding, encoded);

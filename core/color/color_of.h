@@ -118,4 +118,20 @@ VOXDAG_HD inline Color color_of(const ColorSum& sum) {
   return color;
 }
 
+// Returns the color_of() a sum of surfaces whose alpha is 255. `weight` is from 1 to 2^16, and
+// `channels` are its sums of weight x intensity. A mean is rounded half up: it is the integer part
+// of (channel + weight / 2) / weight. 1/4 is added to the numerator, so that the quotient is at
+// least 2^-18 away from an integer, which exceeds the error of the rounded reciprocal.
+VOXDAG_HD inline Color opaque_color_of(uint64_t weight, const std::array<uint64_t, 3>& channels) {
+  const auto w = static_cast<double>(static_cast<int64_t>(weight));
+  const double reciprocal = 1 / w, half = 0.5 * w + 0.25;
+  Color color;
+  for (size_t c = 0; c < 3; ++c) {
+    const double mean =
+        (static_cast<double>(static_cast<int64_t>(channels[c])) + half) * reciprocal;
+    color.rgb[c] = color::srgb_of(static_cast<uint32_t>(static_cast<int32_t>(mean)));
+  }
+  return color;
+}
+
 }  // namespace voxdag

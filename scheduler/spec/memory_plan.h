@@ -45,7 +45,7 @@
 //                   incomplete chunks of surfaces   1/8 of the budget            nobody
 //                 textures, or else spilled         up to 1/2 of the rest        TextureSet
 //                 ColorMemory, for every worker     7/8 of free / workers
-//                   a region, and the encoded       1/2, 12 to 47 MiB            CubeBaker
+//                   a region, and the encoded       1/2, 12 to 50 MiB            CubeBaker
 //                     regions of its cube
 //                   other attributes of a region    16 MiB or more, if any       CubeBaker
 //                   surfaces of a cube              2/3 of the rest              CubeBaker
@@ -117,7 +117,7 @@ struct ColorMemory {
   // Memory for baking one region of the color grid. kRegionBytes is the minimum; with it, a large
   // region is baked in pieces. kSolidRegionBytes is enough to bake any region in one piece.
   static constexpr uint64_t kRegionBytes = uint64_t{12} << 20;
-  static constexpr uint64_t kSolidRegionBytes = uint64_t{47} << 20;
+  static constexpr uint64_t kSolidRegionBytes = uint64_t{50} << 20;
   // Memory for the attributes other than color in a region. Includes kValueSumBytes for the sums of
   // their values. Larger sums are charged in addition (CubeBaker).
   static constexpr uint64_t kValueBytes = uint64_t{16} << 20;

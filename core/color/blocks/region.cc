@@ -7,17 +7,17 @@
 
 namespace voxdag {
 
-// Adds the color of `count` cells of the level that is `up` levels above the region's finest level.
-// They have the same parent, and `code` is the code of any child of this parent.
-inline void RegionEncoder::add_colors(uint32_t up, uint32_t code, size_t count, Color color) {
+// Adds the colors of cells of the level that is `up` levels above the region's finest level. They
+// have the same parent, and `code` is the code of any child of this parent.
+inline void RegionEncoder::add_colors(uint32_t up, uint32_t code, std::span<const Color> colors) {
   constexpr uint32_t kPrefixBits = 3 * kPrefixLevels;
   uint32_t& added = region_.counts[up];
   if (up + kPrefixLevels < levels_ &&
       (added == 0 || code >> kPrefixBits != last_code_ >> kPrefixBits))
     region_.prefix.push_back(added);
   last_code_ = code;
-  added += static_cast<uint32_t>(count);
-  for (size_t i = 0; i < count; ++i) colors_.push_back(color);
+  added += static_cast<uint32_t>(colors.size());
+  for (const Color color : colors) colors_.push_back(color);
 }
 
 // Adds the sum of a cell to its parent. The cells of a level come in Morton order.
@@ -35,16 +35,15 @@ void RegionEncoder::add_level(uint32_t up, std::span<const ColoredCell> cells, u
                               const ColorOf& color) {
   for (const ColoredCell& cell : cells) {
     const uint32_t code = first_code + cell.code;
-    add_colors(up, code, 1, color(cell, code));
+    const Color stored = color(cell, code);
+    add_colors(up, code, {&stored, 1});
     add_to_parent(code, cell.sum);
   }
 }
 
-void RegionEncoder::add_siblings(uint32_t code, size_t count, const FlatColor& color,
-                                 uint64_t weight, Color stored) {
-  add_colors(0, code, count, stored);
-  ColorSum sum;
-  color.add_to(sum, weight);
+void RegionEncoder::add_siblings(uint32_t code, std::span<const Color> colors,
+                                 const ColorSum& sum) {
+  add_colors(0, code, colors);
   add_to_parent(code, sum);
 }
 

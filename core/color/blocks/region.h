@@ -56,18 +56,16 @@ class RegionEncoder {
   void add(std::span<const ColoredCell> cells, uint32_t first_code = 0);
   // Reserves memory for a region of which the first part has `cells` cells of the finest level.
   void reserve(size_t cells);
-  // Adds `count` cells of the finest level that have the same parent. `code` is the code of the
-  // parent's first child, whether or not this child is set. All surfaces in these cells have the
-  // color `color`, and `weight` is the sum of their weights. `stored` is the result of color_of()
-  // for each of the cells. Requires that the constructor got no CellColor.
-  void add_siblings(uint32_t code, size_t count, const FlatColor& color, uint64_t weight,
-                    Color stored);
+  // Adds the 1 to 8 cells of the finest level that have the same parent. `code` is the code of the
+  // parent's first child, whether or not this child is set. `colors` has the color_of() each cell,
+  // and `sum` is the sum of all these cells. Requires that the constructor got no CellColor.
+  void add_siblings(uint32_t code, std::span<const Color> colors, const ColorSum& sum);
   bool empty() const { return colors_.empty(); }
   // Returns the encoded region. Call it once, at the end. Requires at least one cell.
   EncodedRegion finish(uint64_t morton);
 
  private:
-  void add_colors(uint32_t up, uint32_t code, size_t count, Color color);
+  void add_colors(uint32_t up, uint32_t code, std::span<const Color> colors);
   void add_to_parent(uint32_t code, const ColorSum& sum);
   template <class ColorOf>
   void add_level(uint32_t up, std::span<const ColoredCell> cells, uint32_t first_code,

@@ -201,8 +201,10 @@ class RegionBaker {
         added.spot = look_->spot_at(covered_.mean_point(added.p, added.q, totals));
         added.cell = baker_.cells_.cover(added.cell);
       }
-      for (const Cell& added : batch)
-        look_->add(added.spot, added.weight, baker_.cells_.sum(added.cell));
+      for (const Cell& added : batch) {
+        const color::Texel texel = look_->texel_at(added.spot);
+        baker_.cells_.add(added.cell, texel, look_->alpha(texel), added.weight);
+      }
     }
     void add_attributes() {
       if (!facing_) facing_.emplace(baker_.facing_of(surface_));
@@ -265,9 +267,9 @@ class RegionBaker {
       }
       last = waiting.triangle;
       const uint32_t cell = cells_.touch(waiting.code);
-      look->add(
-          look->spot_at(color::closest_point(surface.position, region_.center_of(waiting.code))), 1,
-          cells_.sum(cell));
+      const color::Texel texel = look->texel_at(
+          look->spot_at(color::closest_point(surface.position, region_.center_of(waiting.code))));
+      cells_.add(cell, texel, look->alpha(texel), 1);
       if (cells_.attributes().is_needed()) cells_.attributes().add(cell, facing, 1, 1);
     }
     waiting_.clear();

@@ -7,11 +7,14 @@
 // column restarts the sum from zero. The final sums do not depend on the order of the surfaces.
 //
 // In most cells of scenes without textures, all surfaces have the same flat color. Such a cell
-// needs only the sum of their weights, because its ColorSum is this number times the color.
+// needs only the sum of their weights, because its ColorSum is this number times the color. In most
+// other cells, all surfaces are opaque. Such a cell needs no sums that involve alpha (CellWeight).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <iterator>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -19,7 +22,9 @@
 #include "core/color/cell_values.h"
 #include "core/color/color_of.h"
 #include "core/color/color_sum.h"
+#include "core/color/rule/add_weighted.h"
 #include "core/color/rule/attribute_sums.h"
+#include "core/color/rule/cell_weight.h"
 #include "core/color/rule/color_grid.h"
 
 namespace voxdag::color {
@@ -30,7 +35,7 @@ class RegionCells {
   // Upper bound of the memory of all vectors, without AttributeSums. reserve() prevents that they
   // grow, which would need more.
   static constexpr uint64_t kMaxBytes =
-      uint64_t{kMaxCells} * (sizeof(uint32_t) + sizeof(uint64_t) + sizeof(ColorSum)) + (64 << 10);
+      uint64_t{kMaxCells} * (sizeof(uint32_t) + sizeof(CellWeight) + sizeof(ColorSum)) + (64 << 10);
 
   // `wanted`: the attributes to compute in addition to colors.
   explicit RegionCells(const AttributeSet& wanted = {})
@@ -45,12 +50,12 @@ class RegionCells {
   bool is_covered(uint32_t code) const { return places_[code] >= kCovered; }
   // Call prefetch() some time before touch() or cover(), so that these do not wait for memory.
   VOXDAG_PREFETCH void prefetch(uint32_t code) const { __builtin_prefetch(&places_[code]); }
-  // Adds the cell if it is new, and returns the number of the cell, for add(), sum() and
+  // Adds the cell if it is new, and returns the number of the cell, for add() and
   // attributes().
   uint32_t touch(uint32_t code) {
     uint32_t& place = places_[code];
     if (place == 0) {
-      weights_.push_back(0);
+      weights_.emplace_back();
       place = static_cast<uint32_t>(weights_.size());
       touched_[code / 64] |= uint64_t{1} << code % 64;
     }
@@ -62,22 +67,23 @@ class RegionCells {
     const uint32_t number = touch(code);
     if (!is_covered(code)) {
       places_[code] |= kCovered;
-      uint64_t& weight = weights_[number];
-      if (is_mixed(weight))
-        sums_[weight >> kIndexBits] = {};
+      CellWeight& weight = weights_[number];
+      if (weight.is_mixed())
+        sums_[weight.number()] = {};
       else
-        weight = 0;
+        weight.clear();
       if (attributes_.is_needed()) attributes_.reset(number);
     }
     return number;
   }
   size_t count() const { return weights_.size(); }
 
-  // Returns the index of a color for add(): kMixed if the region already has too many flat colors.
+  // Returns the index of a color for add(): CellWeight::kMixed if the region already has too many
+  // flat colors.
   uint32_t index_of(const FlatColor& color) {
     for (size_t i = flats_.size(); i-- > 0;)
       if (flats_[i].color == color) return static_cast<uint32_t>(i);
-    if (flats_.size() == kMaxFlats) return kMixed;
+    if (flats_.size() == CellWeight::kMaxFlats) return CellWeight::kMixed;
     ColorSum sum;
     color.add_to(sum, 1);
     flats_.push_back({color, color_of(sum)});
@@ -85,23 +91,14 @@ class RegionCells {
   }
   // Adds a surface of a flat color to a cell. `index` is index_of(color).
   void add(uint32_t number, const FlatColor& color, uint32_t index, uint64_t weight) {
-    uint64_t& total = weights_[number];
-    if (index != kMixed && (total == 0 || (total & kIndexMask) == index))
-      total = (total & ~kIndexMask) + (weight << kIndexBits) + index;
-    else
+    if (index == CellWeight::kMixed || !weights_[number].add_flat(index, weight))
       color.add_to(sum(number), weight);
   }
-  // Returns the ColorSum of a cell, to which the caller can add any surface.
-  ColorSum& sum(uint32_t number) {
-    uint64_t& weight = weights_[number];
-    if (!is_mixed(weight)) {
-      if (weight == 0)
-        sums_.emplace_back();
-      else
-        sums_.push_back(sum_of(weight));
-      weight = (sums_.size() - 1) << kIndexBits | kMixed;
-    }
-    return sums_[weight >> kIndexBits];
+  // Adds a surface to a cell. `texel` has its intensities, `alpha` is from 0 to 255, and `weight`
+  // is below 2^16.
+  void add(uint32_t number, Texel texel, uint32_t alpha, uint64_t weight) {
+    if (alpha != 255 || !weights_[number].add_opaque(texel, weight))
+      add_weighted(texel, weight, alpha * weight, sum(number));
   }
 
   AttributeSums& attributes() { return attributes_; }
@@ -131,22 +128,15 @@ class RegionCells {
     ColoredCell others[64];  // cells that are not flat
     size_t waiting = 0;
     const auto add_others = [&] { encoder.add({others, std::exchange(waiting, 0)}, first_code); };
+    Siblings siblings;
     take_siblings([&](uint32_t first, uint32_t mask, const uint32_t* numbers) {
-      const uint64_t index = weights_[numbers[0]] & kIndexMask;
-      bool is_flat = index != kMixed;
-      uint64_t total = 0;
-      const uint32_t* end = numbers;
-      for (uint32_t rest = mask; rest != 0; rest &= rest - 1) {
-        const uint64_t weight = weights_[*end++];
-        is_flat &= (weight & kIndexMask) == index;
-        total += weight >> kIndexBits;
-      }
-      is_flat &= total < kMaxFlatWeight;
-      if (waiting > 0 && (is_flat || waiting > std::size(others) - 8)) add_others();
-      if (is_flat) {
-        const auto& [color, stored] = flats_[index];
-        encoder.add_siblings(first_code + first, static_cast<size_t>(end - numbers), color, total,
-                             stored);
+      const auto count = static_cast<size_t>(popcount64(mask));
+      const uint32_t* const end = numbers + count;
+      const bool is_simple = combine({numbers, count}, siblings);
+      if (waiting > 0 && (is_simple || waiting > std::size(others) - 8)) add_others();
+      if (is_simple) {
+        encoder.add_siblings(first_code + first, std::span(siblings.colors).first(count),
+                             siblings.sum);
         return end;
       }
       for (; numbers != end; mask &= mask - 1)
@@ -159,13 +149,6 @@ class RegionCells {
 
  private:
   static constexpr uint32_t kCovered = 1u << 31;
-  // An element of weights_ consists of an index, in the lowest bits, and a number. If the index is
-  // kMixed, the number is an index into sums_. Otherwise the index is an index into flats_, and the
-  // number is the sum of the weights, below 2^56. The element 0 stands for no surface.
-  static constexpr int kIndexBits = 5;
-  static constexpr uint64_t kIndexMask = (1 << kIndexBits) - 1;
-  static constexpr uint32_t kMixed = kIndexMask;
-  static constexpr size_t kMaxFlats = kMixed;
   // Below this weight, no member of a ColorSum overflows. The color_of() a sum that has overflowed
   // differs from the stored color in `flats_`.
   static constexpr uint64_t kMaxFlatWeight = uint64_t{1} << 40;
@@ -175,11 +158,64 @@ class RegionCells {
     Color stored;  // the color of a cell that only has surfaces of this color
   };
 
-  static bool is_mixed(uint64_t weight) { return (weight & kIndexMask) == kMixed; }
-  ColorSum sum_of(uint64_t weight) const {
-    if (is_mixed(weight)) return sums_[weight >> kIndexBits];
+  // Returns the ColorSum of a cell, to which the caller can add any surface.
+  ColorSum& sum(uint32_t number) {
+    CellWeight& weight = weights_[number];
+    if (!weight.is_mixed()) {
+      if (weight.is_empty())
+        sums_.emplace_back();
+      else
+        sums_.push_back(sum_of(weight));
+      weight.set_mixed(sums_.size() - 1);
+    }
+    return sums_[weight.number()];
+  }
+
+  // The stored colors of cells with the same parent, and the sum of the cells.
+  struct Siblings {
+    Color colors[8];
     ColorSum sum;
-    if (weight != 0) flats_[weight & kIndexMask].color.add_to(sum, weight >> kIndexBits);
+  };
+
+  // Computes the siblings with these numbers if they are all flat, of the same color, or all
+  // opaque. Otherwise returns false.
+  bool combine(std::span<const uint32_t> numbers, Siblings& siblings) const {
+    const uint32_t index = weights_[numbers[0]].index();
+    if (index == CellWeight::kMixed) return false;
+    for (const uint32_t number : numbers)
+      if (weights_[number].index() != index) return false;
+    if (index == CellWeight::kOpaque) {
+      OpaqueSum sum;
+      for (size_t i = 0; i < numbers.size(); ++i) {
+        const CellWeight& weight = weights_[numbers[i]];
+        sum.add(weight);
+        siblings.colors[i] = color_of_opaque(weight);
+      }
+      siblings.sum = sum.color_sum();
+      return true;
+    }
+    uint64_t total = 0;
+    for (const uint32_t number : numbers) total += weights_[number].number();
+    if (total >= kMaxFlatWeight) return false;
+    const auto& [color, stored] = flats_[index];
+    std::fill_n(siblings.colors, numbers.size(), stored);
+    siblings.sum = {};
+    color.add_to(siblings.sum, total);
+    return true;
+  }
+  static Color color_of_opaque(const CellWeight& cell) {
+    return opaque_color_of(cell.opaque_weight(),
+                           {cell.opaque_red(), cell.opaque_green(), cell.opaque_blue()});
+  }
+  ColorSum sum_of(const CellWeight& weight) const {
+    if (weight.is_mixed()) return sums_[weight.number()];
+    if (weight.is_opaque()) {
+      OpaqueSum sum;
+      sum.add(weight);
+      return sum.color_sum();
+    }
+    ColorSum sum;
+    if (!weight.is_empty()) flats_[weight.index()].color.add_to(sum, weight.number());
     return sum;
   }
 
@@ -228,9 +264,9 @@ class RegionCells {
   }
   VOXDAG_PREFETCH void prefetch_sums(const Cells64& cells) const {
     for (uint32_t i = 0; i < cells.count; ++i) {
-      const uint64_t weight = weights_[cells.numbers[i]];
-      if (!is_mixed(weight)) continue;
-      const ColorSum& sum = sums_[weight >> kIndexBits];  // can be in two cache lines
+      const CellWeight& weight = weights_[cells.numbers[i]];
+      if (!weight.is_mixed()) continue;
+      const ColorSum& sum = sums_[weight.number()];  // can be in two cache lines
       __builtin_prefetch(&sum.seen);
       __builtin_prefetch(&sum.weight);
     }
@@ -241,7 +277,7 @@ class RegionCells {
   // if the cell is covered; 0 if no surface touches the cell.
   std::vector<uint32_t> places_;
   std::vector<uint64_t> touched_;
-  std::vector<uint64_t> weights_;
+  std::vector<CellWeight> weights_;
   std::vector<ColorSum> sums_;
   std::vector<Flat> flats_;
 };

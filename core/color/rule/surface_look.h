@@ -90,43 +90,6 @@ VOXDAG_HD inline Texel tinted(Texel texel, const uint32_t (&tint)[4]) {
   return out;
 }
 
-// Adds `texel` to a sum with the weight `weight`. `seen` is `weight` times alpha. Both are below
-// 2^32.
-VOXDAG_HD inline void add_weighted_one_by_one(Texel texel, uint64_t weight, uint64_t seen,
-                                              ColorSum& sum) {
-  for (int c = 0; c < 3; ++c) {
-    const uint64_t intensity = channel(texel, c);
-    sum.plain[static_cast<size_t>(c)] += weight * intensity;
-    sum.seen[static_cast<size_t>(c)] += seen * intensity;
-  }
-  sum.weight += weight;
-  sum.seen_weight += seen;
-}
-// Does the same as add_weighted_one_by_one(). If SSE2 is available, each of its instructions adds
-// to two of the eight sums.
-VOXDAG_HD inline void add_weighted(Texel texel, uint64_t weight, uint64_t seen, ColorSum& sum) {
-#ifdef VOXDAG_SSE2
-  static_assert(sizeof(ColorSum) == 4 * sizeof(__m128i));
-  auto* const sums = reinterpret_cast<__m128i*>(&sum);
-  const auto add = [](__m128i* to, __m128i more) {
-    _mm_storeu_si128(to, _mm_add_epi64(_mm_loadu_si128(to), more));
-  };
-  // The fourth channel is 1, so that the same products also give the sums of weights.
-  const Texel with_one = (texel & 0xffffffffffffull) | Texel{1} << 48;
-  const __m128i zero = _mm_setzero_si128();
-  const __m128i all = _mm_unpacklo_epi16(_mm_cvtsi64_si128(static_cast<int64_t>(with_one)), zero);
-  const __m128i low = _mm_unpacklo_epi32(all, zero), high = _mm_unpackhi_epi32(all, zero);
-  const __m128i plain = _mm_set1_epi64x(static_cast<int64_t>(weight)),
-                visible = _mm_set1_epi64x(static_cast<int64_t>(seen));
-  add(sums, _mm_mul_epu32(low, visible));
-  add(sums + 1, _mm_mul_epu32(high, visible));
-  add(sums + 2, _mm_mul_epu32(low, plain));
-  add(sums + 3, _mm_mul_epu32(high, plain));
-#else
-  add_weighted_one_by_one(texel, weight, seen, sum);
-#endif
-}
-
 // Returns the alpha, 0 to 255, of a surface whose texture and tint give `alpha`, which is 0 to
 // 65535. `is_cut` is explained at SurfaceLook. If it is set, the alpha of the mode kMask is always
 // 255, because the mask of the cutouts has already excluded hidden texels.
@@ -150,7 +113,7 @@ VOXDAG_HD inline std::optional<FlatColor> flat_color_of(const FixedSurface& surf
   return color;
 }
 
-// Adds the color of a triangle to the sums of the cells that it touches. The surface, the material
+// Computes the color of a triangle at its points. The surface, the material
 // and the textures must outlive this object.
 template <class Textures>
 class SurfaceLook {
@@ -196,15 +159,17 @@ class SurfaceLook {
     return spot;
   }
 
-  // Adds the color at a spot to `sum` with `weight`, which is less than 2^24.
-  VOXDAG_HD void add(const Spot& spot, uint64_t weight, ColorSum& sum) {
+  // Returns the color at a spot. Its fourth channel is not the alpha, but alpha() computes it.
+  VOXDAG_HD Texel texel_at(const Spot& spot) {
     Texel texel = ~Texel{0};
     if (view_) texel = is_cut_ ? visible_texel(spot) : look_up(*view_, spot.texels);
-    if (!no_tint_) {
-      if (!one_tint_) set_tint(spot.point);
-      texel = tinted(texel, tint_);
-    }
-    add_weighted(texel, weight, weight * surface_alpha(material_, channel(texel, 3), is_cut_), sum);
+    if (no_tint_) return texel;
+    if (!one_tint_) set_tint(spot.point);
+    return tinted(texel, tint_);
+  }
+  // Returns the alpha, 0 to 255, at a spot with this texel_at().
+  VOXDAG_HD uint32_t alpha(Texel texel) const {
+    return surface_alpha(material_, channel(texel, 3), is_cut_);
   }
 
  private:

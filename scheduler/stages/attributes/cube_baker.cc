@@ -23,7 +23,8 @@ constexpr uint64_t kSurfaceBytes =
 constexpr size_t kPartBytes = 16 << 10;
 
 // Memory of a baked cell: its weight, its sum, a sorted copy of the sum, and its colors.
-constexpr uint64_t kCellBytes = sizeof(uint64_t) + sizeof(ColorSum) + sizeof(ColoredCell) + 8;
+constexpr uint64_t kCellBytes =
+    sizeof(color::CellWeight) + sizeof(ColorSum) + sizeof(ColoredCell) + 8;
 // Other memory of a baker: positions of cells, the next coarser level, two parts of the records,
 // and FlatRegion.
 constexpr uint64_t kFixedBytes = uint64_t{6} << 20;

@@ -212,46 +212,6 @@ TEST(BakeRegion, EncodesWhatItsSumsGive) {
       }
 }
 
-// An encoder that collects the colors of RegionCells.
-struct CollectedColors {
-  std::map<uint32_t, Color> colors;  // only of cells that were not added as siblings
-  size_t siblings = 0;
-  void reserve(size_t) {}
-  void add(std::span<const ColoredCell> cells, uint32_t first_code) {
-    for (const ColoredCell& cell : cells) colors[first_code + cell.code] = color_of(cell.sum);
-  }
-  void add_siblings(uint32_t, size_t count, const FlatColor&, uint64_t, Color) {
-    siblings += count;
-  }
-};
-
-// Cells of one flat color reach the encoder without sums, unless the sums have overflowed. Then
-// the color is that of the sums (docs/color.md).
-TEST(RegionCells, FlatCellsHaveNoSums) {
-  const FlatColor red{{65535, 0, 300}, 255}, blue{{0, 0, 65535}, 127};
-  color::RegionCells cells;
-  for (const uint32_t code : {0u, 5u, 9u, 17u, 26u}) cells.cover(code);
-  const uint32_t first = cells.index_of(red), second = cells.index_of(blue);
-  EXPECT_EQ(cells.index_of(red), first);
-  EXPECT_NE(first, second);
-  cells.add(0, red, first, 64);
-  cells.add(1, red, first, 128);
-  cells.add(2, blue, second, 64);  // alone in its parent
-  cells.add(3, red, first, 64);    // a cell of two colors
-  cells.add(3, blue, second, 64);
-  const uint64_t huge = uint64_t{1} << 41;
-  cells.add(4, red, first, huge);
-  CollectedColors collected;
-  cells.take(100, collected);
-  EXPECT_EQ(collected.siblings, 3u);
-  ColorSum both, overflowed;
-  red.add_to(both, 64);
-  blue.add_to(both, 64);
-  red.add_to(overflowed, huge);
-  EXPECT_EQ(collected.colors,
-            (std::map<uint32_t, Color>{{117, color_of(both)}, {126, color_of(overflowed)}}));
-}
-
 // Sums from 64-bit and from 128-bit integers are equal. A triangle is baked twice; the second time,
 // a vertex is far away in the triangle's plane, so 128 bits are necessary.
 TEST(BakeRegion, WideTrianglesCoverWhatNarrowOnesDo) {

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "core/color/color_of.h"
+#include "core/color/rule/add_weighted.h"
 #include "core/color/rule/columns.h"
-#include "core/color/rule/surface_look.h"
 #include "tests/oracle/scenes.h"
 
 namespace voxdag {
@@ -113,6 +113,26 @@ TEST(ColorVectors, StoredColorsAreThoseOfTheDefinition) {
     ASSERT_EQ(color_of(sum), plain_color(sum)) << sum.weight << " " << alpha;
   }
   EXPECT_GT(transparent, 50u);
+}
+
+// The color of an opaque cell is that of the definition, for means at and next to every threshold.
+TEST(ColorVectors, ColorsOfOpaqueCellsAreThoseOfTheDefinition) {
+  oracle::Random random(6);
+  constexpr color::SrgbThresholds kThresholds{};
+  for (int i = 0; i < 60000; ++i) {
+    const int bits = static_cast<int>(random.between(0, 15));
+    ColorSum sum;
+    sum.weight = static_cast<uint64_t>(random.between(1, int64_t{1} << bits)) * 2;
+    sum.seen_weight = 255 * sum.weight;
+    for (size_t c = 0; c < 3; ++c) {
+      // The mean is half a unit below a threshold, or slightly less. It is 65535 for i = 0.
+      const uint64_t twice = 2 * uint64_t{kThresholds.of[random.between(0, 255)]} - 1;
+      sum.plain[c] = i == 0 ? 65535 * sum.weight
+                            : sum.weight / 2 * twice - static_cast<uint64_t>(random.coin());
+      sum.seen[c] = 255 * sum.plain[c];
+    }
+    ASSERT_EQ(opaque_color_of(sum.weight, sum.plain), plain_color(sum)) << sum.weight;
+  }
 }
 
 }  // namespace
