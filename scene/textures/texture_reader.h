@@ -3,8 +3,7 @@
 // scratch file. A reader caches as many pages as its memory can hold. Not thread-safe; any number
 // of readers may be open.
 //
-// A level is cut into tiles of 32 x 32 texels, row by row. Tiles at the right and lower border are
-// padded. Each tile is stored as one page: its texels row by row, eight bytes each.
+// A level is stored as tiles (core/color/samples/tiled_level.h). Each tile is one page.
 #pragma once
 
 #include <cstddef>
@@ -15,12 +14,11 @@
 #include "core/base/host_device.h"
 #include "core/base/memory_budget.h"
 #include "core/base/page_buffer.h"
+#include "core/color/samples/tiled_level.h"
 #include "core/io/file_system.h"
 
 namespace voxdag {
 
-inline constexpr uint32_t kTileShift = 5;
-inline constexpr uint32_t kTileEdge = 1u << kTileShift;
 inline constexpr size_t kPageTexels = size_t{kTileEdge} * kTileEdge;
 inline constexpr size_t kPageBytes = kPageTexels * sizeof(uint64_t);
 
@@ -75,6 +73,10 @@ class TextureReader {
     uint64_t texel(uint32_t x, uint32_t y) const {
       const uint64_t place = place_of(x, y);
       return texels_ ? texels_[place] : reader_.cached_texel(first_ + place);
+    }
+    // Returns the level's texels in memory; without texels if they are in the file.
+    TiledLevel tiled() const {
+      return {texels_, width_, height_, static_cast<uint32_t>(row_of_tiles_)};
     }
     // Starts to load a texel that is in memory into the CPU's cache, for a later texel().
     VOXDAG_PREFETCH void prefetch(uint32_t x, uint32_t y) const {

@@ -30,6 +30,7 @@
 #include "core/color/rule/region_box.h"
 #include "core/color/rule/region_cells.h"
 #include "core/color/rule/surface_look.h"
+#include "core/color/samples/sample_batch.h"
 #include "core/color/surface.h"
 #include "core/geometry/cube.h"
 
@@ -159,19 +160,12 @@ class RegionBaker {
     }
     void flush() {
       if (collected_ == 0) return;
-      if (!look_ && !flat_) {
-        const Material& material = baker_.materials_[surface_.material];
-        const bool is_cut = baker_.has_mask(surface_.material);
-        flat_ = color::flat_color_of(surface_, material, is_cut);
-        if (flat_)
-          flat_index_ = baker_.cells_.index_of(*flat_);
-        else
-          look_.emplace(surface_, material, baker_.textures_, triangle_.cell_bits, triangle_.area,
-                        is_cut);
-      }
+      if (!look_ && !flat_) prepare();
       const auto batch = std::span(batch_).first(collected_);
       if (flat_)
         add_flat(batch);
+      else if (is_sampled_)
+        add_samples(batch);
       else
         add_spots(batch);
       if (baker_.cells_.attributes().is_needed()) add_attributes();
@@ -179,14 +173,27 @@ class RegionBaker {
     }
 
    private:
-    static constexpr size_t kBatch = 32;
+    static constexpr size_t kBatch = color::SampleBatch::kMaxCells;
     struct Cell {
       int64_t p, q;
       // `cell` is the cell's Morton code, and after cover() the cell's number in RegionCells.
       uint32_t columns, cell, weight;
-      typename color::SurfaceLook<Textures>::Spot spot;
     };
 
+    void prepare() {
+      const Material& material = baker_.materials_[surface_.material];
+      const bool is_cut = baker_.has_mask(surface_.material);
+      flat_ = color::flat_color_of(surface_, material, is_cut);
+      if (flat_) {
+        flat_index_ = baker_.cells_.index_of(*flat_);
+        return;
+      }
+      look_.emplace(surface_, material, baker_.textures_, triangle_.cell_bits, triangle_.area,
+                    is_cut);
+      for (int d = 0; d < 2; ++d) first_[d] = baker_.region_.first(triangle_.axis[d]);
+      is_sampled_ = baker_.kernels_ && look_->describe(sampled_) &&
+                    covered_.describe(first_[0], first_[1], sampled_);
+    }
     void add_flat(std::span<Cell> batch) {
       for (Cell& added : batch) {
         added.weight = covered_.weight(color::count_of(added.columns));
@@ -194,17 +201,47 @@ class RegionBaker {
         baker_.cells_.add(added.cell, *flat_, flat_index_, added.weight);
       }
     }
-    void add_spots(std::span<Cell> batch) {
-      for (Cell& added : batch) {
+    void add_samples(std::span<Cell> batch) {
+      color::SampleBatch& samples = baker_.samples_;
+      for (size_t i = 0; i < batch.size(); ++i) {
+        const Cell& added = batch[i];
         const color::ColumnTotals totals = color::totals_of(added.columns);
-        added.weight = covered_.weight(static_cast<uint32_t>(totals.count));
-        added.spot = look_->spot_at(covered_.mean_point(added.p, added.q, totals));
-        added.cell = baker_.cells_.cover(added.cell);
+        samples.count[i] = static_cast<int32_t>(totals.count);
+        samples.x[i] =
+            static_cast<int32_t>(4 * (added.p - first_[0]) * totals.count + totals.sum_i);
+        samples.y[i] =
+            static_cast<int32_t>(4 * (added.q - first_[1]) * totals.count + totals.sum_j);
+        samples.share[i] = color::reciprocal_of(totals.count);
       }
-      for (const Cell& added : batch) {
-        const color::Texel texel = look_->texel_at(added.spot);
-        baker_.cells_.add(added.cell, texel, look_->alpha(texel), added.weight);
+      baker_.kernels_->find_texels(sampled_, samples, batch.size());
+      for (size_t i = 0; i < batch.size(); ++i) {
+        batch[i].weight = covered_.weight(static_cast<uint32_t>(samples.count[i]));
+        batch[i].cell = baker_.cells_.cover(batch[i].cell);
       }
+      uint32_t others = baker_.kernels_->blend(sampled_, samples, batch.size());
+      if (!look_->is_cut()) others = 0;
+      for (size_t i = 0; i < batch.size(); ++i) {
+        if (others >> i & 1)
+          add_spot(batch[i], spot_of(batch[i]));
+        else
+          baker_.cells_.add(batch[i].cell, color::CellWeight::opaque(samples.weighted[i]));
+      }
+    }
+    void add_spots(std::span<Cell> batch) {
+      typename color::SurfaceLook<Textures>::Spot spots[kBatch];
+      for (size_t i = 0; i < batch.size(); ++i) {
+        spots[i] = spot_of(batch[i]);
+        batch[i].weight = covered_.weight(color::count_of(batch[i].columns));
+        batch[i].cell = baker_.cells_.cover(batch[i].cell);
+      }
+      for (size_t i = 0; i < batch.size(); ++i) add_spot(batch[i], spots[i]);
+    }
+    auto spot_of(const Cell& added) const {
+      return look_->spot_at(covered_.mean_point(added.p, added.q, color::totals_of(added.columns)));
+    }
+    void add_spot(const Cell& added, const auto& spot) {
+      const color::Texel texel = look_->texel_at(spot);
+      baker_.cells_.add(added.cell, texel, look_->alpha(texel), added.weight);
     }
     void add_attributes() {
       if (!facing_) facing_.emplace(baker_.facing_of(surface_));
@@ -220,6 +257,9 @@ class RegionBaker {
     std::optional<FlatColor> flat_;                     // the color, if it is flat
     uint32_t flat_index_ = 0;                           // index_of() this color in RegionCells
     std::optional<color::SurfaceLook<Textures>> look_;  // set if the color is not flat
+    bool is_sampled_ = false;  // true if the kernels compute the color, from sampled_
+    color::SampledSurface sampled_;
+    int64_t first_[2] = {};  // least p and q of a cell
     std::optional<color::SurfaceFacing> facing_;
     Cell batch_[kBatch];
     size_t collected_ = 0;
@@ -300,6 +340,8 @@ class RegionBaker {
   uint32_t max_cells_ = 0;
   color::RegionBox region_;
   color::RegionCells cells_;
+  const color::SampleKernels* const kernels_ = color::sample_kernels_avx2();
+  color::SampleBatch samples_ = {};
   std::vector<Waiting> waiting_;
   std::vector<CellValues> values_;  // values that finish(cells) discards
 };

@@ -32,6 +32,9 @@ class RegionBox {
     }
   }
 
+  // Returns the position of the region's first cell along an axis.
+  int64_t first(int axis) const { return first_[axis]; }
+
   // Returns the cells of the color grid that the bounding box of a triangle touches.
   CellBox cells_of(const FixedTriangle& triangle) const {
     return CellBox(triangle, grid_.levels, grid_.color_levels);

@@ -82,12 +82,12 @@ class RegionCells {
   // flat colors.
   uint32_t index_of(const FlatColor& color) {
     for (size_t i = flats_.size(); i-- > 0;)
-      if (flats_[i].color == color) return static_cast<uint32_t>(i);
+      if (flats_[i].color == color) return static_cast<uint32_t>(i) + CellWeight::kFirstFlat;
     if (flats_.size() == CellWeight::kMaxFlats) return CellWeight::kMixed;
     ColorSum sum;
     color.add_to(sum, 1);
     flats_.push_back({color, color_of(sum)});
-    return static_cast<uint32_t>(flats_.size()) - 1;
+    return static_cast<uint32_t>(flats_.size()) - 1 + CellWeight::kFirstFlat;
   }
   // Adds a surface of a flat color to a cell. `index` is index_of(color).
   void add(uint32_t number, const FlatColor& color, uint32_t index, uint64_t weight) {
@@ -95,10 +95,19 @@ class RegionCells {
       color.add_to(sum(number), weight);
   }
   // Adds a surface to a cell. `texel` has its intensities, `alpha` is from 0 to 255, and `weight`
-  // is below 2^16.
+  // is from 1 to 2^16 - 1.
   void add(uint32_t number, Texel texel, uint32_t alpha, uint64_t weight) {
-    if (alpha != 255 || !weights_[number].add_opaque(texel, weight))
+    if (alpha == 255)
+      add(number, CellWeight(texel, weight));
+    else
       add_weighted(texel, weight, alpha * weight, sum(number));
+  }
+  // Adds the surfaces of an opaque cell.
+  void add(uint32_t number, const CellWeight& opaque) {
+    if (weights_[number].add_opaque(opaque)) return;
+    OpaqueSum more;
+    more.add(opaque);
+    more.add_to(sum(number));
   }
 
   AttributeSums& attributes() { return attributes_; }
@@ -197,7 +206,7 @@ class RegionCells {
     uint64_t total = 0;
     for (const uint32_t number : numbers) total += weights_[number].number();
     if (total >= kMaxFlatWeight) return false;
-    const auto& [color, stored] = flats_[index];
+    const auto& [color, stored] = flats_[index - CellWeight::kFirstFlat];
     std::fill_n(siblings.colors, numbers.size(), stored);
     siblings.sum = {};
     color.add_to(siblings.sum, total);
@@ -215,7 +224,8 @@ class RegionCells {
       return sum.color_sum();
     }
     ColorSum sum;
-    if (!weight.is_empty()) flats_[weight.index()].color.add_to(sum, weight.number());
+    if (!weight.is_empty())
+      flats_[weight.index() - CellWeight::kFirstFlat].color.add_to(sum, weight.number());
     return sum;
   }
 

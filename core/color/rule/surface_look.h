@@ -11,6 +11,7 @@
 #include "core/color/cutouts/hidden.h"
 #include "core/color/rule/exact.h"
 #include "core/color/rule/texture_lookup.h"
+#include "core/color/samples/sample_batch.h"
 #include "core/color/surface.h"
 
 namespace voxdag::color {
@@ -143,6 +144,33 @@ class SurfaceLook {
     no_tint_ = one_tint_;
     for (const uint32_t t : tint_) no_tint_ = no_tint_ && t == kFullIntensity;
   }
+
+  // Sets the members of `out` that describe the color. Returns false if SampleKernels cannot
+  // compute this color.
+  bool describe(SampledSurface& out) const {
+    if constexpr (requires { view_->tiled(); }) {
+      const bool is_opaque = material_.alpha_mode == AlphaMode::kOpaque ||
+                             (is_cut_ && material_.alpha_mode == AlphaMode::kMask);
+      if (!view_ || !one_tint_ || !is_opaque) return false;
+      out.level = view_->tiled();
+      if (!out.level.texels) return false;
+      for (int a = 0; a < 2; ++a) {
+        out.wrap[a] = wrap_[a];
+        out.texture[a] = corners_[0].texture[static_cast<size_t>(a)];
+        for (int i = 0; i < 2; ++i) {
+          constexpr int64_t kSmall = int64_t{1} << 30;
+          if (change_[i][a] >= kSmall || change_[i][a] <= -kSmall) return false;
+          out.change[a][i] = static_cast<int32_t>(change_[i][a]);
+        }
+      }
+      out.has_tint = !no_tint_;
+      for (size_t c = 0; c < 4; ++c) out.tint[c] = tint_[c];
+      return true;
+    }
+    return false;
+  }
+  // True if texels whose alpha is not full need texel_at().
+  bool is_cut() const { return is_cut_; }
 
   // A point of the triangle, and the texels around the point.
   struct Spot {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "tests/oracle/scenes.h"
@@ -41,9 +42,17 @@ class TestImages {
         texel[3] = (x * 8 / width) % 3 == 0 ? 0 : static_cast<uint16_t>(20000 + 40000 * y / height);
         image.texels.push_back(texel);
       }
-    pyramids_.push_back({image});
-    while (pyramids_.back().back().width > 1 || pyramids_.back().back().height > 1)
-      pyramids_.back().push_back(halved(pyramids_.back().back()));
+    add(std::move(image));
+  }
+
+  // Adds an image as add() does. Alpha is 0 in the stripes, and otherwise full.
+  void add_cut(uint32_t width, uint32_t height, uint64_t seed) {
+    add(width, height, seed);
+    TestLevel image = std::move(pyramids_.back().front());
+    pyramids_.pop_back();
+    for (auto& texel : image.texels)
+      if (texel[3] != 0) texel[3] = 65535;
+    add(std::move(image));
   }
 
   // Adds an opaque white image of one texel.
@@ -66,6 +75,12 @@ class TestImages {
   const TestLevel& image(uint32_t index) const { return pyramids_[index][0]; }
 
  private:
+  void add(TestLevel image) {
+    pyramids_.emplace_back().push_back(std::move(image));
+    while (pyramids_.back().back().width > 1 || pyramids_.back().back().height > 1)
+      pyramids_.back().push_back(halved(pyramids_.back().back()));
+  }
+
   static TestLevel halved(const TestLevel& fine) {
     TestLevel coarse{std::max(1u, fine.width / 2), std::max(1u, fine.height / 2), {}};
     for (uint32_t y = 0; y < coarse.height; ++y)
