@@ -38,16 +38,20 @@ struct SrgbThresholds {
       54183, 54708, 55235, 55766, 56300, 56836, 57376, 57918, 58464, 59012, 59564, 60118, 60675,
       61236, 61799, 62366, 62935, 63508, 64083, 64662, 65244, 65535};
 };
-// Element k is the stored value of the intensity 16 k. The stored value of an intensity from 16 k
-// to 16 k + 15 is the same or one more.
-struct SrgbStarts {
-  uint8_t of[4096] = {};
-  constexpr SrgbStarts() {
+// Element k is for the intensities from 16 k to 16 k + 15. Its high byte is the stored value of 16
+// k. Thresholds are more than 16 apart, so the other intensities have this value or the next one.
+// The low byte is the number of intensities that have the stored value of 16 k.
+struct SrgbSteps {
+  uint16_t of[4096] = {};
+  constexpr SrgbSteps() {
     constexpr SrgbThresholds kThresholds{};
     uint32_t stored = 0;
     for (uint32_t k = 0; k < 4096; ++k) {
       while (stored < 255 && kThresholds.of[stored] <= 16 * k) ++stored;
-      of[k] = static_cast<uint8_t>(stored);
+      uint32_t equal = 16;
+      if (stored < 255 && kThresholds.of[stored] < 16 * k + 16)
+        equal = kThresholds.of[stored] - 16 * k;
+      of[k] = static_cast<uint16_t>(stored << 8 | equal);
     }
   }
 };
@@ -55,11 +59,9 @@ struct SrgbStarts {
 // Returns the nearest value in sRGB: the number of thresholds that are <= `intensity`. Requires
 // intensity <= 65535.
 VOXDAG_HD inline uint8_t srgb_of(uint32_t intensity) {
-  static constexpr SrgbThresholds kThresholds{};
-  static constexpr SrgbStarts kStarts{};
-  // Thresholds are more than 16 apart, so at most one is between the start and the intensity.
-  const uint32_t stored = kStarts.of[intensity >> 4];
-  return static_cast<uint8_t>(stored + (stored < 255) * (kThresholds.of[stored] <= intensity));
+  static constexpr SrgbSteps kSteps{};
+  const uint32_t step = kSteps.of[intensity >> 4];
+  return static_cast<uint8_t>((step >> 8) + ((intensity & 15) >= (step & 255)));
 }
 
 // Returns the middle of the intensities that are stored as `stored`. For 0 and 255, returns the
