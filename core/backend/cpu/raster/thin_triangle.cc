@@ -31,20 +31,21 @@ bool ThinTriangle<Coordinate>::set_planes(const int64_t (&v)[3][3], const Int (&
   // 0. If this component is negative, subtracting 1 makes the value negative.
   int128 origin = (n[0] != 0 ? n[0] : n[1] != 0 ? n[1] : n[2]) < 0 ? -1 : 0;
   for (int a = 0; a < 3; ++a) origin -= static_cast<int128>(n[a]) * v[a][0];
-  int128 lowest_of[3];
-  for (int a = 0; a < 3; ++a) {
+  const auto lowest_of = [&](int a) {
     const Int across = n[(a + 1) % 3] + n[(a + 2) % 3];
-    lowest_of[a] = ((origin + static_cast<int128>(across) * kHalfVoxel) >> kUnitBits) +
-                   this->positive_part(n[a]);
-    width_along[a] = size[a] - 1;
-  }
+    return ((origin + static_cast<int128>(across) * kHalfVoxel) >> kUnitBits) +
+           this->positive_part(n[a]);
+  };
   const int up = this->dominant;
-  const int128 base = lowest_of[up], span = tile_voxels - 1;
+  const int128 base = lowest_of(up), span = tile_voxels - 1;
   const Int rising =
       this->positive_part(n[0]) + this->positive_part(n[1]) + this->positive_part(n[2]);
   const Int falling = rising - (size[0] + size[1] + size[2]);
-  if (base + span * rising < 0 || base + span * falling > width_along[up]) return false;
-  for (int a = 0; a < 3; ++a) lowest_along[a] = static_cast<Int>(lowest_of[a]);
+  if (base + span * rising < 0 || base + span * falling >= size[up]) return false;
+  for (int a = 0; a < 3; ++a) {
+    lowest_along[a] = static_cast<Int>(a == up ? base : lowest_of(a));
+    width_along[a] = size[a] - 1;
+  }
   this->lowest = lowest_along[up];
   this->width = width_along[up];
   return true;

@@ -101,29 +101,47 @@ class Heights {
     return c;
   }
 
-  // Returns the HeightBounds (sides.h) of the 16 voxel columns. Voxel columns whose lane of `outer`
-  // is all ones have no voxels.
-  VOXDAG_INLINE HeightBounds bounds(const Column& c, __m256i outer) const {
+  // The heights of the 16 voxel columns, with a lane for each of them.
+  struct Lanes {
+    __m256i below, top;
+    bool is_corrected;  // true if some lanes were computed exactly; they have no fractions
+  };
+  VOXDAG_INLINE Lanes lanes(const Column& c) const {
     const __m256i base = _mm256_set1_epi16(static_cast<int16_t>(c.within));
-    __m256i below = _mm256_add_epi16(base, below_lanes_);
-    __m256i top = _mm256_add_epi16(base, top_lanes_);
-    const __m256i raised = _mm256_add_epi16(below, _mm256_set1_epi16(kBelowDoubt));
-    const __m256i lowered = _mm256_sub_epi16(top, _mm256_set1_epi16(kTopDoubt));
-    const __m256i whole = _mm256_set1_epi16(static_cast<int16_t>(0xffff << kHeightBits));
+    Lanes out{_mm256_add_epi16(base, below_lanes_), _mm256_add_epi16(base, top_lanes_), false};
+    const __m256i raised = _mm256_add_epi16(out.below, _mm256_set1_epi16(kBelowDoubt));
+    const __m256i lowered = _mm256_sub_epi16(out.top, _mm256_set1_epi16(kTopDoubt));
     const __m256i differ =
-        _mm256_or_si256(_mm256_xor_si256(raised, below), _mm256_xor_si256(lowered, top));
-    if (!_mm256_testz_si256(differ, whole)) [[unlikely]]
-      divide_exactly(c.p, c.q, c.brick, _mm256_and_si256(differ, whole), below, top);
-    below = _mm256_or_si256(below, outer);
+        _mm256_or_si256(_mm256_xor_si256(raised, out.below), _mm256_xor_si256(lowered, out.top));
+    if (!_mm256_testz_si256(differ, whole())) [[unlikely]] {
+      divide_exactly(c.p, c.q, c.brick, _mm256_and_si256(differ, whole()), out.below, out.top);
+      out.is_corrected = true;
+    }
+    return out;
+  }
+  // Returns the HeightBounds (sides.h) of the 16 voxel columns.
+  static VOXDAG_INLINE HeightBounds bounds_of(const Lanes& lanes) {
     // The result for the top is its distance from the highest voxel, 15 - top. This is `top` with
     // its four bits inverted.
-    return _mm256_packus_epi16(_mm256_srli_epi16(below, kHeightBits),
-                               _mm256_srli_epi16(_mm256_andnot_si256(top, whole), kHeightBits));
+    return _mm256_packus_epi16(
+        _mm256_srli_epi16(lanes.below, kHeightBits),
+        _mm256_srli_epi16(_mm256_andnot_si256(lanes.top, whole()), kHeightBits));
+  }
+  // Does the same for a column of bricks. Voxel columns whose lane of `outer` is all ones have no
+  // voxels.
+  VOXDAG_INLINE HeightBounds bounds(const Column& c, __m256i outer) const {
+    Lanes at = lanes(c);
+    at.below = _mm256_or_si256(at.below, outer);
+    return bounds_of(at);
   }
 
  private:
   static constexpr int P = kP<D>, Q = kQ<D>;
 
+  // The bits of a lane above the fraction of a voxel.
+  static VOXDAG_INLINE __m256i whole() {
+    return _mm256_set1_epi16(static_cast<int16_t>(0xffff << kHeightBits));
+  }
   VOXDAG_INLINE int64_t height_of(int p, int q) const {
     return origin_ + step_p_ * p + step_q_ * q;
   }
@@ -131,7 +149,8 @@ class Heights {
   // Safety margins in units of a lane. With them, `below` and `top` in bounds() never exclude a
   // touched voxel. They allow for three roundings (a column's base is truncated to a whole unit,
   // below_lanes_ are rounded, top_lanes_ are truncated) and for 0.02 units of rounding in floats:
-  //   below   is in (y - 2.02, y - 0.02]. It can be on the wrong side of a whole number of voxels
+  //   below   is in (y - 2.02, y - 0.02], see also SideCrossings (thin_by_columns.h). It can be on
+  //   the wrong side of a whole number of voxels
   //           that is 1 or 2 units above it.
   //   top     is in (y + width / n_D + 0.02, y + width / n_D + 2.02]. It can be on the wrong side
   //           of a whole number of voxels that is 0, 1 or 2 units below it.

@@ -45,7 +45,8 @@ struct ColumnList {
   int count = 0;
   uint8_t numbers[256 + 16];  // 16 spare elements, because add() always writes 16 numbers
 
-  // Adds the columns of bricks `first` to `last` of row q, 0 <= first <= last <= 15.
+  // Adds the columns of bricks `first` to `last` of row q, 0 <= first <= last + 1 <= 16. Adds none
+  // if first = last + 1.
   VOXDAG_INLINE void add(int q, int first, int last) {
     const __m128i steps = _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     _mm_storeu_si128(reinterpret_cast<__m128i*>(numbers + count),
