@@ -1,5 +1,5 @@
-// What RegionCells stores of a cell's surfaces in 16 bytes. Most cells need no more. The other
-// cells have a ColorSum elsewhere.
+// The 16 bytes that RegionCells stores for each cell. For most cells, they contain the sums over
+// the cell's surfaces. The other cells also have a ColorSum.
 //
 //     kind     low                       high
 //     empty    0                         0
