@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 namespace voxdag {
 
@@ -26,18 +27,18 @@ inline double process_cpu_seconds() { return clock_seconds(CLOCK_PROCESS_CPUTIME
 inline double thread_cpu_seconds() { return clock_seconds(CLOCK_THREAD_CPUTIME_ID); }
 
 // The CPU times of this process's threads, which show whether a stage keeps all threads busy. A
-// thread adds its time when it ends. All threads of parallel_for() with the same worker number
-// share one entry, also in different calls. All background threads share one entry.
+// thread adds its time when its work ends. All threads of parallel_for() with the same worker
+// number share one entry, also in different calls. All background threads share one entry.
 class ThreadTimes {
  public:
   static constexpr size_t kThreads = 257;  // entries: workers 0 to 255, and background threads
   static constexpr size_t kBackground = kThreads - 1;  // entry of the background threads
   using Seconds = std::array<double, kThreads>;
 
-  // Adds the calling thread's time to a worker's entry. Call it once, when the thread ends. Workers
-  // above 255 share the entry of worker 255.
-  static void add(size_t worker) { times_ns_[std::min(worker, kBackground - 1)] += now_ns(); }
-  static void add_background() { times_ns_[kBackground] += now_ns(); }
+  // Adds the calling thread's time since its last call to a worker's entry. Call it when the work
+  // of the thread ends. Workers above 255 share the entry of worker 255.
+  static void add(size_t worker) { add_to(std::min(worker, kBackground - 1)); }
+  static void add_background() { add_to(kBackground); }
   // Returns the CPU seconds of each entry so far. Entry 0 also includes the calling thread's time.
   static Seconds now() {
     Seconds seconds;
@@ -47,7 +48,11 @@ class ThreadTimes {
   }
 
  private:
-  static uint64_t now_ns() { return static_cast<uint64_t>(1e9 * thread_cpu_seconds()); }
+  static void add_to(size_t entry) {
+    thread_local uint64_t added_ns = 0;
+    const auto now_ns = static_cast<uint64_t>(1e9 * thread_cpu_seconds());
+    times_ns_[entry] += now_ns - std::exchange(added_ns, now_ns);
+  }
 
   static inline std::array<std::atomic<uint64_t>, kThreads> times_ns_{};
 };

@@ -18,7 +18,7 @@ namespace voxdag {
 namespace {
 
 // Arrays of at most kSmallBytes use the general allocator.
-constexpr size_t kSmallBytes = size_t{32} << 10;
+constexpr size_t kSmallBytes = size_t{128} << 10;
 constexpr size_t kAlignment = 64;  // a cache line, and the widest vector register
 
 bool is_small(size_t bytes) { return bytes <= kSmallBytes; }

@@ -1,8 +1,8 @@
 // A large array of zero-filled pages allocated directly from the system; arrays of 2 MiB or more
 // request huge pages. Tables and level arrays use this buffer because freed pages return to the
-// system immediately, which the general allocator does not guarantee. Arrays of at most 32 KiB use
-// the general allocator, because a small build would otherwise make hundreds of system calls for
-// them. Not thread-safe.
+// system immediately, which the general allocator does not guarantee. Arrays of at most 128 KiB
+// use the general allocator, because a small build would otherwise make hundreds of system calls
+// for them. Not thread-safe.
 #pragma once
 
 #include <cstddef>

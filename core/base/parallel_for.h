@@ -8,12 +8,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <exception>
+#include <future>
 #include <mutex>
-#include <system_error>
-#include <thread>
 #include <vector>
 
 #include "core/base/clock.h"
+#include "core/base/threads/kept_threads.h"
 
 namespace voxdag {
 
@@ -44,15 +44,15 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
     work(worker);
     ThreadTimes::add(worker);
   };
-  std::vector<std::thread> threads;
+  std::vector<std::future<void>> others;
   try {
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
-      threads.emplace_back(work_and_end, worker);
+      others.push_back(KeptThreads::start([&, worker] { work_and_end(worker); }));
   } catch (const std::exception&) {
     // The system refused to start a thread. The threads started so far and the caller do all work.
   }
   work(0);
-  for (std::thread& thread : threads) thread.join();
+  for (std::future<void>& other : others) other.wait();
   if (failure) std::rethrow_exception(failure);
 }
 
@@ -69,8 +69,10 @@ class Turns {
   }
   // Ends the current turn. The next item then gets its turn.
   void end() {
-    const std::lock_guard lock(mutex_);
-    ++turn_;
+    {
+      const std::lock_guard lock(mutex_);
+      ++turn_;
+    }
     changed_.notify_all();
   }
   // True if an earlier item has failed, so that `item` gets no turn.

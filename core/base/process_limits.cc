@@ -229,11 +229,16 @@ void return_freed_memory_to_system() {
   // Each request for memory from the system is this much larger than needed, so there are fewer
   // requests. Only memory that the process uses becomes resident.
   mallopt(M_TOP_PAD, 512 << 10);
-  mallopt(M_ARENA_MAX, 2);
+  mallopt(M_ARENA_MAX, 1);
 #endif
 }
 
 void trim_heap() {
+#if defined(__GLIBC__) && __GLIBC_PREREQ(2, 33)
+  // A smaller part is not worth a system call for each of its blocks.
+  constexpr size_t kMinFreeBytes = size_t{4} << 20;
+  if (mallinfo2().fordblks < kMinFreeBytes) return;
+#endif
 #ifdef __GLIBC__
   malloc_trim(0);
 #endif

@@ -70,7 +70,7 @@ Error error_of(const std::system_error& error);
 void return_freed_memory_to_system();
 // Returns the pages of small freed blocks to the system. The C library retains these pages even
 // after return_freed_memory_to_system(). Call trim_heap() after many small blocks were freed. No
-// effect without glibc.
+// effect if less than 4 MiB are free, or without glibc.
 void trim_heap();
 
 }  // namespace voxdag

@@ -94,6 +94,9 @@ struct MemoryPlan {
   static constexpr uint64_t ingest_workers(uint64_t free_bytes) {
     return std::max<uint64_t>(free_bytes / 2 / kIngestWorkerBytes, 1);
   }
+  // A thread that reads or partitions the scene processes at least this many pieces. Fewer pieces
+  // take a few milliseconds, so they are not worth the memory and the start of another thread.
+  static constexpr uint64_t kMinPiecesPerThread = 4;
   // Returns the number of reading threads: at most `threads`, at most one per piece, and at most
   // ingest_workers(free_bytes).
   static constexpr unsigned ingest_threads(uint64_t pieces, uint64_t free_bytes, unsigned threads) {

@@ -37,8 +37,8 @@ void read_pieces(TriangleSource& scene, const uint64_t& position, const StageCon
     const uint64_t declared = scene.declared_triangles();
     const uint64_t pieces =
         (declared - std::min(first, declared) + kPieceTriangles - 1) / kPieceTriangles;
-    const unsigned readers =
-        MemoryPlan::ingest_threads(pieces, context.budget.available(), max_readers);
+    const unsigned readers = MemoryPlan::ingest_threads(pieces / MemoryPlan::kMinPiecesPerThread,
+                                                        context.budget.available(), max_readers);
     struct Reader {
       std::unique_ptr<TriangleCursor> cursor;
       std::optional<Piece> piece;

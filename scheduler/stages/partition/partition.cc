@@ -161,8 +161,8 @@ void partition_scene(TriangleStore& store, uint32_t grid_levels, std::span<const
   BinWriter writer(store, targets, buffer_bytes);
   const uint64_t end = std::max(store.count(kSceneBin), first);
   const uint64_t pieces = (end - first + kPartitionPiece - 1) / kPartitionPiece;
-  const unsigned threads =
-      MemoryPlan::ingest_threads(pieces, context.budget.available(), context.threads);
+  const unsigned threads = MemoryPlan::ingest_threads(pieces / MemoryPlan::kMinPiecesPerThread,
+                                                      context.budget.available(), context.threads);
   std::vector<std::unique_ptr<TouchedPiece>> worker_pieces(threads);
   context.build.progress.begin_stage("partition", end, "triangles");
   context.build.progress.resume_at(first);
