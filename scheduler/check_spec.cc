@@ -81,7 +81,6 @@ BuildSpec with_resolution(const BuildSpec& spec, const BuildContext& context) {
 void refuse_own_files(const BuildSpec& spec, BuildScene& scene, const std::string& work_folder,
                       std::vector<std::string> outputs, const BuildContext& context) {
   FileSystem& files = context.files;
-  std::erase_if(outputs, [&](const std::string& path) { return !files.exists(path); });
   std::vector<std::string> own = WorkFolder::files_in(files, work_folder);
   const bool is_first = !own.empty() && !files.exists(WorkFolder::store_path(work_folder));
   own.insert(own.end(), outputs.begin(), outputs.end());
@@ -128,7 +127,7 @@ void check_places(const BuildSpec& spec, BuildScene& scene, const BuildContext& 
   const std::string partial = output + ".partial", report = report_path(spec.run);
   std::vector<std::string> outputs = {output, partial, OutputLock::path_of(output)};
   if (!report.empty()) outputs.insert(outputs.end(), {report, report + ".partial"});
-  for (const std::string& path : outputs) refuse_link(path);
+  std::erase_if(outputs, [](const std::string& path) { return !refuse_link(path); });
   refuse_own_files(spec, scene, work, outputs, context);
   refuse_foreign_file(files, output, is_global_file, " (-o)");
   // If the work folder has a job, voxdag created the partial file, even if its first bytes are

@@ -10,6 +10,7 @@
 #include "core/base/options/option_text.h"
 #include "core/base/process_limits.h"
 #include "core/base/text.h"
+#include "core/base/threads/kept_threads.h"
 #include "core/fields/field.h"
 #include "core/io/outputs/space_reserve.h"
 #include "scheduler/check_spec.h"
@@ -108,9 +109,11 @@ void plan(BuildJob& job, const PreparedScene& scene) {
   }
   if (check_disk_space(job.spec, scene, job.scene, job.work.path(), job.budget, job.context))
     job.clock.finish("estimate");
-  job.work.remove_rows();
-  job.work.remove_filled();
-  job.work.remove_frame();  // an earlier build may have had another scene
+  if (!job.work.was_empty()) {  // an earlier build may have had another scene
+    job.work.remove_rows();
+    job.work.remove_filled();
+    job.work.remove_frame();
+  }
   std::vector<StoredSubvolume> subvolumes(scene.plan.size());
   for (size_t i = 0; i < subvolumes.size(); ++i) {
     subvolumes[i].cube = scene.plan[i].cube;
@@ -125,7 +128,7 @@ void plan(BuildJob& job, const PreparedScene& scene) {
 // job store nor by one of the job's FilledParts objects.
 void resume_subvolumes(BuildJob& job, SubvolumeBuilder& builder, const std::string& scene_digest) {
   builder.resume(scene_digest);
-  if (!job.spec.run.cluster) {
+  if (!job.spec.run.cluster && !job.work.was_empty()) {
     accept_earlier_tasks(job, scene_digest);
     remove_tasks(job);
   }
@@ -465,6 +468,7 @@ std::string submit_merge_job(BuildJob& job, MergeJob& merge_job, GuardedOutputs&
 }  // namespace
 
 BuildReport run_build(const BuildSpec& requested, const BuildContext& caller) {
+  const KeptThreads threads;
   const BuildSpec spec = checked(with_resolution(requested, caller));
   SpaceReserve reserve(caller.files, spec.run.min_free_bytes);
   GuardedOutputs files(reserve);

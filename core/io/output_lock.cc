@@ -17,7 +17,8 @@ OutputLock::OutputLock(FileSystem& files, const std::string& output, std::unique
 OutputLock::~OutputLock() {
   try {
     // If the file is not empty, voxdag did not create it, so it is kept.
-    if (files_.open_read(path_)->size() == 0) files_.remove(path_);
+    const auto found = files_.identify(path_);
+    if (found && found->bytes == 0) files_.remove(path_);
   } catch (const Error&) {
     // The empty lock file remains. The next process that writes this output locks it.
   }

@@ -34,11 +34,13 @@ std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string
   }
 }
 
-void refuse_link(const std::string& path) {
+bool refuse_link(const std::string& path) {
   struct stat found {};
-  if (lstat(path.c_str(), &found) == 0 && S_ISLNK(found.st_mode))
+  if (lstat(path.c_str(), &found) != 0) return false;
+  if (S_ISLNK(found.st_mode))
     throw Error(ErrorCode::kInvalidInput,
                 path + " is a symbolic link: expected a regular file, or a free name");
+  return true;
 }
 
 void refuse_inputs(FileSystem& files, std::span<const std::string> paths,

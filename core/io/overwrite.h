@@ -17,8 +17,9 @@ namespace voxdag {
 std::unique_ptr<ReadableFile> open_if_there(FileSystem& files, const std::string& path);
 
 // Throws Error{kInvalidInput} if `path` is a symbolic link. A rename to `path` would replace the
-// link instead of the file to which it points, and this file could be anywhere.
-void refuse_link(const std::string& path);
+// link instead of the file to which it points, and this file could be anywhere. Otherwise returns
+// true if anything exists at `path`.
+bool refuse_link(const std::string& path);
 
 // Throws Error{kInvalidInput} if one of `paths` is the same file as one of `inputs`. The files at
 // `paths` need not exist.

@@ -7,7 +7,10 @@
 
 namespace voxdag {
 
+void ScratchFolder::make() { files_.make_directories(path_); }
+
 void ScratchFolder::remove_all_but(const std::set<std::string>& names) {
+  if (!files_.exists(path_)) return;
   const auto is_ours = [](const std::string& name) {
     return name.starts_with("merge-") || name.starts_with("segment-");
   };
@@ -28,9 +31,11 @@ ScratchPath::~ScratchPath() {
 ScratchFile::ScratchFile(ScratchFolder& folder)
     : folder_(folder),
       state_{folder.next_id(), 0, {}},
-      path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))),
-      out_(folder.files().create(path_->path())),
-      in_(folder.files().open_own(path_->path())) {}
+      path_(std::make_shared<ScratchPath>(folder, name_of(state_.id))) {
+  folder.make();
+  out_ = folder.files().create(path_->path());
+  in_ = folder.files().open_own(path_->path());
+}
 
 ScratchFile::ScratchFile(ScratchFolder& folder, ScratchFileState state)
     : folder_(folder),

@@ -19,15 +19,15 @@ namespace voxdag {
 
 class ScratchFolder {
  public:
-  // Creates the folder if it is missing.
-  ScratchFolder(FileSystem& files, const std::string& path) : files_(files), path_(path) {
-    files_.make_directories(path_);
-  }
+  // Does not create the folder: make() does.
+  ScratchFolder(FileSystem& files, const std::string& path) : files_(files), path_(path) {}
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
 
   FileSystem& files() { return files_; }
   const std::string& path() const { return path_; }
+  // Creates the folder if it is missing. Call it before creating a file. Most merges need no file.
+  void make();
   // Bytes that this merge has written to files in the folder, including removed files.
   uint64_t bytes_written() const { return bytes_written_; }
   void count_written(uint64_t bytes) { bytes_written_ += bytes; }

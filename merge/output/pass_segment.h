@@ -17,6 +17,7 @@ class PassSegment {
  public:
   PassSegment(ScratchFolder& scratch, MemoryBudget& budget)
       : PassSegment(scratch, kFirstPassSegment + scratch.next_id()) {
+    scratch.make();
     writer_.emplace(scratch.files(), scratch.path(), id_, budget);
   }
   // Opens the segment left by an earlier merge.

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/options/option_text.h"
+#include "core/io/buffered/small_file.h"
 #include "scene/chained_scene.h"
 #include "scene/formats/unknown_file.h"
 #include "scene/gltf/gltf_scene.h"
@@ -48,6 +49,9 @@ const SceneFormat& format_of(const ReadableFile& file) {
     if (format.sniff(file)) return format;
   refuse_unknown_file(file);
 }
+
+// A scene file of at most this size is read in one step.
+constexpr uint64_t kSmallSceneBytes = uint64_t{1} << 20;
 
 using Parts = std::vector<std::unique_ptr<TriangleSource>>;
 
@@ -109,7 +113,8 @@ std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<
   Parts parts;
   for (const std::string& path : paths) {
     cancel.check();
-    std::unique_ptr<ReadableFile> file = files.open_read(path);
+    std::unique_ptr<ReadableFile> file =
+        read_if_small(files.open_read(path), kSmallSceneBytes, budget);
     const SceneFormat& format = format_of(*file);
     parts.push_back(format.open(files, std::move(file), options, budget, cancel));
   }

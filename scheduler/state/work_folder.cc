@@ -79,8 +79,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
   const auto try_lock = [&]() -> std::unique_ptr<FileLock> {
     files_.make_directories(parent_directory(path_));
     files_.make_directory(path_);
-    check_is_ours();
-    existed_before_ = files_.exists(lock_path);
+    inspect();
     try {
       return files_.try_lock(lock_path);
     } catch (const Error& error) {
@@ -98,7 +97,7 @@ WorkFolder::WorkFolder(const BuildContext& context, std::string path, double max
   files_.create(lock_path)->write_at(0, std::as_bytes(std::span(holder)));
 }
 
-void WorkFolder::check_is_ours() const {
+void WorkFolder::inspect() {
   const auto refuse = [&](const std::string& name) {
     const std::string option = option_text("work");
     throw Error(ErrorCode::kInvalidInput,
@@ -107,16 +106,22 @@ void WorkFolder::check_is_ours() const {
                     "folder or the folder of an earlier build" +
                     (option.empty() ? "" : " (" + option + ")"));
   };
-  for (const DirectoryEntry& entry : files_.list(path_))
+  const std::vector<DirectoryEntry> entries = files_.list(path_);
+  const auto has = [&](std::string_view name) {
+    return std::ranges::find(entries, name, &DirectoryEntry::name) != entries.end();
+  };
+  for (const DirectoryEntry& entry : entries)
     if (!is_ours(entry)) refuse(entry.name);
   const auto check_folder = [&](std::string_view name, bool (*is_known)(const DirectoryEntry&)) {
+    if (!has(name)) return;
     const std::string folder = path_ + "/" + std::string(name);
-    if (!files_.exists(folder)) return;
     for (const DirectoryEntry& entry : files_.list(folder))
       if (!is_known(entry)) refuse(std::string(name) + "/" + entry.name);
   };
   check_folder(kScratchName, is_scratch);
   check_folder(kClusterName, is_of_cluster);
+  existed_before_ = has(kLockName);
+  was_empty_ = entries.empty();
 }
 
 std::string WorkFolder::holder(FileSystem& files, const std::string& folder) {
@@ -140,7 +145,7 @@ std::vector<std::string> WorkFolder::files_in(FileSystem& files, const std::stri
   return paths;
 }
 
-std::shared_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
+std::unique_ptr<ReadableFile> WorkFolder::open_segment(uint32_t id) const {
   return files_.open_own(segment_path(path_, id));
 }
 
@@ -200,14 +205,11 @@ void WorkFolder::release(const SegmentRange& range) {
 
 void WorkFolder::empty_scratch() {
   for (const std::string& path : scratch_files()) files_.remove(path);
-  files_.make_directory(scratch_path());
-  if (names_are_synced_) files_.sync_directory(path_);
 }
 
 void WorkFolder::sync_names() {
   files_.sync_directory(parent_directory(path_));
   files_.sync_directory(path_);
-  names_are_synced_ = true;
 }
 
 std::vector<std::string> WorkFolder::scratch_files() const {
@@ -250,17 +252,24 @@ void WorkFolder::remove() {
     // The lock file is removed last, so that no other build uses the folder before it is empty. The
     // sample rows of a solid are removed after the job store: a build that resumes with this store
     // needs them for its report.
-    std::vector<std::string> others = scratch_files();
-    for (const DirectoryEntry& entry : files_.list(path_))
+    const std::vector<DirectoryEntry> entries = files_.list(path_);
+    const auto has = [&](const std::string& path) {
+      return std::ranges::any_of(
+          entries, [&](const DirectoryEntry& entry) { return path_ + "/" + entry.name == path; });
+    };
+    const bool has_scratch = has(scratch_path());
+    std::vector<std::string> others;
+    if (has_scratch) others = scratch_files();
+    for (const DirectoryEntry& entry : entries)
       if (is_ours(entry) && !entry.is_directory && entry.name != kLockName &&
           path_ + "/" + entry.name != rows_path())
         others.push_back(path_ + "/" + entry.name);
     const size_t removers = std::min(others.size() / kFilesPerRemover, kMaxRemovers);
     parallel_for(static_cast<unsigned>(removers), others.size(),
                  [&](unsigned, size_t i) { files_.remove(others[i]); });
-    remove_rows();
-    remove_cluster_files();
-    if (files_.exists(scratch_path())) files_.remove_directory(scratch_path());
+    if (has(rows_path())) remove_rows();
+    if (has(cluster_path())) remove_cluster_files();
+    if (has_scratch) files_.remove_directory(scratch_path());
     files_.remove(path_ + "/" + std::string(kLockName));
     files_.remove_directory(path_);
   } catch (const Error&) {

@@ -2,7 +2,6 @@
 // names that voxdag uses are removed from it. The folder itself is removed when it is empty.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -30,6 +29,8 @@ class WorkFolder {
   const std::string& path() const { return path_; }
   // True if an earlier build used the folder.
   bool existed_before() const { return existed_before_; }
+  // True if the folder had no files when this object was constructed.
+  bool was_empty() const { return was_empty_; }
   std::string store_path() const { return store_path(path_); }
   static std::string store_path(const std::string& folder) { return folder + "/job.db"; }
   // Returns the process that has locked the folder, as "process 17 on box"; "" if none has.
@@ -64,7 +65,7 @@ class WorkFolder {
   std::string scratch_path() const { return path_ + "/merge"; }
   // Folder that a cluster build shares with its tasks.
   std::string cluster_path() const { return path_ + "/cluster"; }
-  std::shared_ptr<ReadableFile> open_segment(uint32_t id) const;
+  std::unique_ptr<ReadableFile> open_segment(uint32_t id) const;
   // Returns an unused id for this process's segments: one more than the largest existing id below
   // kFirstClusterSegment.
   uint32_t next_segment_id() const;
@@ -78,7 +79,7 @@ class WorkFolder {
   // Removes the segments for which `is_named` returns false. An interrupted build left them, and no
   // row of the store refers to them.
   void remove_garbage(const std::function<bool(uint32_t segment)>& is_named);
-  // Removes the merge's scratch files, and creates the scratch folder if it does not exist.
+  // Removes the merge's scratch files.
   void empty_scratch();
   // Syncs the names of the folder and of its files. Until the first call, a power cut can remove
   // the folder with its files. Any thread may call it.
@@ -112,7 +113,9 @@ class WorkFolder {
   void remove();
 
  private:
-  void check_is_ours() const;
+  // Throws Error if the folder has files that are not voxdag's. Sets existed_before_ and
+  // was_empty_.
+  void inspect();
   std::vector<std::string> scratch_files() const;
   void remove_if_empty(const std::string& folder);
   void remove_silently(const std::string& path);
@@ -120,7 +123,7 @@ class WorkFolder {
   FileSystem& files_;
   const std::string path_;
   bool existed_before_ = false;
-  std::atomic<bool> names_are_synced_ = false;
+  bool was_empty_ = false;
   std::unique_ptr<FileLock> lock_;
   std::map<uint32_t, std::unique_ptr<WritableFile>> released_;  // segments with a freed part
 };

@@ -154,7 +154,7 @@ class CrashTest : public testing::TestWithParam<Ingested> {
   // there.
   void kill_at_any_operation() {
     const uint64_t operations = operations_of_a_build();
-    ASSERT_GT(operations, 20u);
+    ASSERT_GT(operations, 15u);
     for (const Fault fault : {Fault::kKillBefore, Fault::kKillAfter, Fault::kPowerCut}) {
       uint64_t kills = 0;
       for (const uint64_t at : moments(operations)) {

@@ -12,6 +12,7 @@
 #include "core/format/checksum.h"
 #include "core/format/global/block_checksums.h"
 #include "core/format/global/global_layout.h"
+#include "core/io/buffered/buffered_writer.h"
 #include "core/io/overwrite.h"
 #include "core/io/temporary_paths.h"
 
@@ -23,6 +24,9 @@ namespace {
 
 constexpr uint64_t kReadBytes = uint64_t{1} << 20;
 static_assert(kReadBytes % kChecksumBlockBytes == 0);
+// Digesting a smaller file takes a few milliseconds, so background threads are not worth their
+// start.
+constexpr uint64_t kMinBackgroundBytes = uint64_t{8} << 20;
 
 // The header page. Fields that put() has not set are 0.
 class HeaderPage {
@@ -70,11 +74,11 @@ struct GlobalFileWriter::State {
   const Grid grid;
   const uint32_t hash_bits;
   const uint64_t narrow_words;
-  std::unique_ptr<WritableFile> file;  // null until the first level or the header is written
-  std::vector<GlobalLevel> levels;     // complete levels, from the bricks upwards
-  std::vector<Section> sections;       // complete sections
-  BlockChecksums block_checksums;      // checksums of the complete and open levels and sections
-  uint64_t checksummed_words = 0;      // words of the open level that block_checksums includes
+  std::unique_ptr<BufferedWriter> file;  // null until the first level or the header is written
+  std::vector<GlobalLevel> levels;       // complete levels, from the bricks upwards
+  std::vector<Section> sections;         // complete sections
+  BlockChecksums block_checksums;        // checksums of the complete and open levels and sections
+  uint64_t checksummed_words = 0;        // words of the open level that block_checksums includes
   bool level_open = false;
   uint64_t section_bytes = 0;  // bytes of the open section
   bool section_open = false;
@@ -95,7 +99,7 @@ struct GlobalFileWriter::State {
   }
   void create_file() {
     if (file) return;
-    file = files.create(partial_path);
+    file = std::make_unique<BufferedWriter>(files.create(partial_path));
     registered.emplace(partial_path);
   }
   // Returns the offset in the file of a level that place_levels() placed.
@@ -168,7 +172,7 @@ void GlobalFileWriter::resume(const GlobalFileProgress& progress) {
                [&](std::span<const std::byte> chunk) { checksums.add(chunk); });
   if (checksums.values() != progress.checksums) s.damaged(last_block);
   s.block_checksums = std::move(checksums);
-  s.file = s.files.open_write(s.partial_path);
+  s.file = std::make_unique<BufferedWriter>(s.files.open_write(s.partial_path));
   s.levels = progress.levels;
   s.end = end;
   s.retain();
@@ -386,6 +390,7 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
   BlockChecksums read_back;
   // Digesting a chunk takes longer than reading it and computing its checksums. So with several
   // threads, a background thread digests a chunk while the next chunk is read.
+  const bool in_background = threads > 1 && end >= kMinBackgroundBytes;
   std::vector<std::byte> chunk, digested_chunk;
   std::future<void> digested;
   for (uint64_t at = kPageBytes; at < end; at += kReadBytes) {
@@ -395,7 +400,7 @@ std::string GlobalFileWriter::State::digest(const HeaderPage& header,
     read_back.add(chunk);
     if (digested.valid()) digested.get();
     chunk.swap(digested_chunk);
-    if (threads > 1)
+    if (in_background)
       digested = run_in_background([&] { digest.add(digested_chunk); });
     else
       digest.add(digested_chunk);
@@ -427,6 +432,7 @@ GlobalFileFrame GlobalFileWriter::frame(const VoxelCounts& counts) const {
                 s.path + ": expected all levels and no attribute section: found " +
                     std::to_string(s.levels.size()) + " of " + std::to_string(s.brick_level() + 1) +
                     " levels and " + std::to_string(s.sections.size()) + " sections");
+  if (s.file) s.file->flush();
   const std::vector<uint64_t> checksums = s.block_checksums.values();
   const auto table = std::as_bytes(std::span(checksums));
   const HeaderPage header = s.header(counts, table);
@@ -448,6 +454,7 @@ HeaderPage GlobalFileWriter::State::write_header(const VoxelCounts& counts,
   file->write_at(end, table);
   HeaderPage page = header(counts, table);
   file->write_at(0, page.bytes());
+  file->flush();  // digest() reads the file
   return page;
 }
 

@@ -134,7 +134,8 @@ class GlobalFileWriter {
   void end_section(const GlobalAttribute& attribute);
 
   // Returns the header page and the checksum table that the file would have without attribute
-  // sections. Call it after the last level and before the first section.
+  // sections. Call it after the last level and before the first section. Afterwards, readers of the
+  // partial file see all levels.
   GlobalFileFrame frame(const VoxelCounts& counts) const;
 
   // Writes checksums and header, syncs the file, and reads it back to verify it. Returns the size

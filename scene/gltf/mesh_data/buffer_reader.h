@@ -38,7 +38,7 @@ class ExternalFiles {
 
 class BufferReader {
  public:
-  static constexpr size_t kWindowBytes = size_t{256} << 10;
+  static constexpr size_t kWindowBytes = size_t{192} << 10;
 
   // Makes one of `readers` readers of the document. Adds the files that it opens to
   // `external_files`. All arguments passed by reference must outlive the reader.

@@ -6,12 +6,16 @@
 
 #include "core/base/error.h"
 #include "core/base/options/option_text.h"
+#include "core/io/buffered/small_file.h"
 #include "merge/merge.h"
 #include "scheduler/solid/full_cubes.h"
 #include "scheduler/state/job/empty_scene.h"
 
 namespace voxdag {
 namespace {
+
+// Artifacts of at most this total size are merged from memory.
+constexpr uint64_t kSmallMergeBytes = uint64_t{4} << 20;
 
 // Stores a merge's state in the job store.
 class StoredCheckpoint : public Checkpoint {
@@ -96,7 +100,16 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
     inputs.artifacts.push_back(write_full_cubes(job));
   const MemoryCharge list(job.budget, inputs.artifacts.size() * sizeof(ArtifactRef),
                           "the list of artifacts");
-  inputs.open_segment = [&](uint32_t id) { return job.work.open_segment(id); };
+  uint64_t bytes = 0;
+  for (const ArtifactRef& artifact : inputs.artifacts) bytes += artifact.bytes;
+  const bool is_small = bytes <= kSmallMergeBytes;
+  std::map<uint32_t, std::shared_ptr<ReadableFile>> small_segments;  // each is read once
+  inputs.open_segment = [&, is_small](uint32_t id) -> std::shared_ptr<ReadableFile> {
+    if (!is_small) return job.work.open_segment(id);
+    std::shared_ptr<ReadableFile>& segment = small_segments[id];
+    if (!segment) segment = read_if_small(job.work.open_segment(id), kSmallMergeBytes, job.budget);
+    return segment;
+  };
   inputs.scratch_folder = job.work.scratch_path();
   inputs.checkpoint_interval_s = job.spec.run.checkpoint_interval_s;
   StoredCheckpoint checkpoint(job);

@@ -24,7 +24,7 @@ class MergeErrors : public testing::Test {
       harness_.merge(options);
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), code) << error.message();
-      EXPECT_TRUE(std::filesystem::is_empty(harness_.scratch_folder()));
+      EXPECT_TRUE(harness_.has_no_scratch());
       EXPECT_FALSE(std::filesystem::exists(harness_.folder().file("merged.vdag.partial")));
       return error;
     }

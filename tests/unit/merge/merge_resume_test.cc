@@ -182,7 +182,8 @@ TEST(MergeCheckpoint, TheMergeContinuesWhileAStateIsSaved) {
         : meeting(with), scratch_folder(std::move(folder)) {}
     // A file in the scratch folder shows that the merge has begun to save a state.
     void advance(uint64_t) override {
-      if (!std::filesystem::is_empty(scratch_folder)) meeting.meet(meeting.merging, meeting.saving);
+      if (std::filesystem::exists(scratch_folder) && !std::filesystem::is_empty(scratch_folder))
+        meeting.meet(meeting.merging, meeting.saving);
     }
     Meeting& meeting;
     const std::string scratch_folder;

@@ -18,6 +18,8 @@ class MeteredFiles : public ForwardingFiles {
  public:
   MeteredFiles() : ForwardingFiles(system_files()) {}
 
+  std::map<std::string, uint64_t> reads;           // by path: number of calls of read_at()
+  std::map<std::string, uint64_t> writes;          // by path: number of calls of write_at()
   std::map<std::string, uint64_t> bytes_read;      // by path
   std::map<std::string, uint64_t> bytes_written;   // by path
   std::map<std::string, uint64_t> bytes_released;  // by path
@@ -31,6 +33,8 @@ class MeteredFiles : public ForwardingFiles {
 
   void forget_counts() {
     directory_syncs.clear();
+    reads.clear();
+    writes.clear();
     bytes_read.clear();
     bytes_written.clear();
     bytes_released.clear();
@@ -74,6 +78,7 @@ class MeteredFiles : public ForwardingFiles {
     Reader(MeteredFiles& files, std::unique_ptr<ReadableFile> file)
         : ForwardingReader(std::move(file)), files_(files) {}
     void read_at(uint64_t offset, std::span<std::byte> out) const override {
+      files_.add(files_.reads, path(), 1);
       files_.add(files_.bytes_read, path(), out.size());
       ForwardingReader::read_at(offset, out);
     }
@@ -89,6 +94,7 @@ class MeteredFiles : public ForwardingFiles {
     void write_at(uint64_t offset, std::span<const std::byte> data) override {
       if (path() == files_.full_for)
         throw Error(ErrorCode::kNoSpace, "write " + path() + ": the test's disk is full");
+      files_.add(files_.writes, path(), 1);
       files_.add(files_.bytes_written, path(), data.size());
       ForwardingWriter::write_at(offset, data);
     }

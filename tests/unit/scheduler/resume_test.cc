@@ -21,7 +21,6 @@
 #include "scheduler/state/work_folder.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/unit/scheduler/interruptions.h"
-#include "tests/unit/scheduler/metered_files.h"
 #include "tests/unit/scheduler/spheres_build.h"
 
 namespace voxdag {
@@ -390,21 +389,6 @@ TEST_F(ResumeTest, SaysHowToResume) {
     EXPECT_TRUE(error.message().ends_with("; run the same command again to resume"))
         << error.what();
   }
-}
-
-// A build that ends before its first checkpoint is due syncs only its output, its report and the
-// folder that contains them. It creates no job store.
-TEST_F(ResumeTest, AShortBuildSyncsOnlyItsResults) {
-  BuildSpec short_build = spec();
-  short_build.run.checkpoint_interval_s = 1e9;
-  MeteredFiles files;
-  NoProgress progress;
-  CancelToken cancel;
-  run_build(short_build, {files, progress, cancel});
-  const std::string report = default_report_path(output()) + ".partial";
-  EXPECT_EQ(files.syncs,
-            (std::map<std::string, uint64_t>{{output() + ".partial", 1}, {report, 1}}));
-  EXPECT_EQ(files.directory_syncs, (std::map<std::string, uint64_t>{{folder_.path(), 1}}));
 }
 
 // Ends the process without any cleanup when the output gets its final name.
