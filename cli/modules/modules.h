@@ -12,6 +12,7 @@
 // signal removes.
 #pragma once
 
+#include "client/http/http_connection.h"
 #include "core/image/readers.h"
 #include "query/export/export_job.h"
 #include "scene/import/import.h"
@@ -43,10 +44,18 @@ struct ImportModule {
   decltype(&voxdag::is_imported_scene) is_imported_scene;
 };
 
+struct HttpModule {
+  static constexpr const char* kName = "http";
+  ModuleHead head;
+  decltype(&client::open_http) open_http;
+  decltype(&client::supports_https) supports_https;
+};
+
 extern "C" {
 extern const VdbModule voxdag_vdb_module;
 extern const AvifModule voxdag_avif_module;
 extern const ImportModule voxdag_import_module;
+extern const HttpModule voxdag_http_module;
 }
 
 }  // namespace voxdag::cli

@@ -35,7 +35,8 @@ std::string output_of(const std::string& command) {
 TEST_F(Modules, TheProgramStartsWithoutTheirLibraries) {
   const std::string libraries = output_of("LD_TRACE_LOADED_OBJECTS=1 '" VOXDAG_BINARY "'");
   EXPECT_NE(libraries.find("libc.so"), std::string::npos);
-  for (const char* name : {"libopenvdb", "libtbb", "libavif", "libassimp"})
+  for (const char* name :
+       {"libopenvdb", "libtbb", "libavif", "libassimp", "libcpp-httplib", "libbrotli"})
     EXPECT_EQ(libraries.find(name), std::string::npos) << libraries;
 }
 

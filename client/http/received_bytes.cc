@@ -1,4 +1,4 @@
-#include "client/received_bytes.h"
+#include "client/http/received_bytes.h"
 
 #include <linux/tcp.h>  // <netinet/tcp.h> defines tcp_info without tcpi_bytes_received
 #include <netinet/in.h>
