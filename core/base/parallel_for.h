@@ -46,6 +46,7 @@ void parallel_for(unsigned workers, size_t count, Body&& body) {
   };
   std::vector<std::future<void>> others;
   try {
+    others.reserve(std::min<size_t>(workers, count));  // push_back() must not throw
     for (unsigned worker = 1; worker < workers && worker < count; ++worker)
       others.push_back(KeptThreads::start([&, worker] { work_and_end(worker); }));
   } catch (const std::exception&) {

@@ -229,7 +229,7 @@ void return_freed_memory_to_system() {
   // Each request for memory from the system is this much larger than needed, so there are fewer
   // requests. Only memory that the process uses becomes resident.
   mallopt(M_TOP_PAD, 512 << 10);
-  mallopt(M_ARENA_MAX, 1);
+  mallopt(M_ARENA_MAX, 2);
 #endif
 }
 
