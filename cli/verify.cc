@@ -147,7 +147,9 @@ nlohmann::ordered_json verify_json(const VerifyCommand& command, const voxdag_re
   return json;
 }
 
-void check_radius(const VerifyCommand& command) {
+void check_rule(const VerifyCommand& command) {
+  if (command.thin && !command.solid.empty())
+    throw Error(ErrorCode::kInvalidInput, "--thin: expected no --solid at the same time");
   if (command.radius == 0 || (command.solid == "enclosed" && command.radius <= kMaxRadius)) return;
   throw Error(ErrorCode::kInvalidInput, "--radius " + std::to_string(command.radius) +
                                             ": expected 0 to " + std::to_string(kMaxRadius) +
@@ -155,7 +157,7 @@ void check_radius(const VerifyCommand& command) {
 }
 
 void run(const VerifyCommand& command, CommandContext& context) {
-  check_radius(command);
+  check_rule(command);
   const auto file = open_global_file(command.path);
   const WatchedFile watched(*file);
   const auto progress = make_progress_bar(command.quiet);

@@ -17,7 +17,8 @@ constexpr double kClosed = 0.001, kScene = 0.05;
 
 std::string percent_text(double part) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.2g %%", 100 * part);
+  const double percent = 100 * part;
+  std::snprintf(text, sizeof text, percent < 10 ? "%.2g %%" : "%.0f %%", percent);
   return text;
 }
 

@@ -84,6 +84,8 @@ TEST_F(RadiusOption, RefusedValues) {
   expect_error(
       2, "16",
       {"verify", "b.vdag", "--against", "box.obj", "--solid", "enclosed", "--radius", "17"});
+  expect_error(2, "--thin: expected no --solid at the same time",
+               {"verify", "b.vdag", "--against", "box.obj", "--solid", "enclosed", "--thin"});
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "core/fields/field.h"
 
 namespace voxdag {
@@ -54,6 +56,10 @@ TEST(SolidReportTest, MoreThanFivePercentOfOpenRowsAreAScene) {
     EXPECT_TRUE(contains(scene, "more a scene than an object")) << scene;
     EXPECT_TRUE(contains(scene, "123 456 filled voxels rest on a majority")) << scene;
     EXPECT_TRUE(contains(scene, "--solid enclosed")) << scene;
+    for (const auto& [rows, percent] : {std::pair(1160, "12 %"), std::pair(10000, "100 %")}) {
+      const std::string open = message(report_of(rule, rows, rows), "solid-open");
+      EXPECT_TRUE(contains(open, "not closed (" + std::string(percent) + " of")) << open;
+    }
   }
 }
 
