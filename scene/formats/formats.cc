@@ -50,7 +50,7 @@ const SceneFormat& format_of(const ReadableFile& file) {
   refuse_unknown_file(file);
 }
 
-// A scene file of at most this size is read in one step.
+// The first files of a scene are read in one step, as long as they have at most this total size.
 constexpr uint64_t kSmallSceneBytes = uint64_t{1} << 20;
 
 using Parts = std::vector<std::unique_ptr<TriangleSource>>;
@@ -111,10 +111,15 @@ std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel) {
   Parts parts;
+  uint64_t small_bytes = std::min(kSmallSceneBytes, budget.available() / 16);
   for (const std::string& path : paths) {
     cancel.check();
-    std::unique_ptr<ReadableFile> file =
-        read_if_small(files.open_read(path), kSmallSceneBytes, budget);
+    std::unique_ptr<ReadableFile> file = files.open_read(path);
+    const uint64_t bytes = file->size();
+    if (bytes <= small_bytes) {
+      file = read_if_small(std::move(file), bytes, budget);
+      small_bytes -= bytes;
+    }
     const SceneFormat& format = format_of(*file);
     parts.push_back(format.open(files, std::move(file), options, budget, cancel));
   }

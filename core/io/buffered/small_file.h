@@ -12,8 +12,8 @@ namespace voxdag {
 
 // If `file` has at most `max_bytes` bytes, reads all of them and returns a file that reads from
 // memory. Otherwise, or if the bytes would take more than a sixteenth of the free budget, returns
-// `file` unchanged. Charges the bytes to `budget`, which must outlive the returned file. Throws
-// Error if the bytes cannot be read.
+// `file` unchanged. The caller limits the total size of several files. Charges the bytes to
+// `budget`, which must outlive the returned file. Throws Error if the bytes cannot be read.
 std::unique_ptr<ReadableFile> read_if_small(std::unique_ptr<ReadableFile> file, uint64_t max_bytes,
                                             MemoryBudget& budget);
 

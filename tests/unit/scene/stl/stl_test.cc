@@ -196,5 +196,26 @@ TEST(Stl, OtherFilesAreNotClaimed) {
   EXPECT_TRUE(is_stl(binary_stl(facet_bytes(kFacet) + "x", 1)));
 }
 
+// Small files are read in one step, and stay in memory as long as the scene. Many of them together
+// must not take more memory than one.
+TEST(Stl, ManySmallFilesTakeLittleMemory) {
+  MemoryFiles files;
+  std::vector<std::string> names;
+  std::string facets;
+  for (int i = 0; i < 4000; ++i) facets += facet_bytes(kFacet);
+  for (int i = 0; i < 100; ++i) {
+    names.push_back(std::to_string(i) + ".stl");
+    files.contents[names.back()] = binary_stl(facets, 4000);
+  }
+  const CancelToken never;
+  for (const uint64_t limit : {uint64_t{64} << 20, uint64_t{8} << 20}) {
+    MemoryBudget budget(limit);
+    const auto source = open_scene(files, names, {}, budget, never);
+    EXPECT_EQ(source->declared_triangles(), 400'000u);
+    EXPECT_GT(budget.used(), 0u);
+    EXPECT_LE(budget.used(), std::min(uint64_t{1} << 20, limit / 16));
+  }
+}
+
 }  // namespace
 }  // namespace voxdag::test
