@@ -30,7 +30,7 @@ bool is_folder(FileSystem& files, const std::string& path) {
 
 PackageIndex index_of_folder(FileSystem& files, const std::string& folder) {
   const std::string path = folder + "/" + kIndexName;
-  return parse_index(read_small_file(files, path, kMaxIndexBytes), path);
+  return parse_index(read_small_file(files, path, kMaxIndexBytes), path, PackageVersions::kKnown);
 }
 
 // Returns the names of all files of a package whose names contain a hash: all except package.json
@@ -56,7 +56,8 @@ void refuse_other_folder(FileSystem& files, const std::string& path) {
   try {
     index_of_folder(files, path);
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::kNotFound && !error.is_corruption()) throw;
+    const bool is_of_a_package = error.code() == ErrorCode::kUnsupportedVersion;
+    if (is_of_a_package || (error.code() != ErrorCode::kNotFound && !error.is_corruption())) throw;
     throw Error(ErrorCode::kInvalidInput, path + " has files that are not of a package" + advice);
   }
 }

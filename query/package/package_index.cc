@@ -42,7 +42,7 @@ bool is_safe_name(const std::string& name) {
 
 class Parser {
  public:
-  explicit Parser(const std::string& path) : path_(path) {}
+  Parser(const std::string& path, PackageVersions accepted) : path_(path), accepted_(accepted) {}
 
   PackageIndex parse(std::string_view text) const {
     bool is_too_deep = false;
@@ -55,11 +55,12 @@ class Parser {
     expect(json.is_object() && json.value("format", Json()) == kFormat, "'format'",
            std::string("'") + kFormat + "'");
     const Json version = json.value("version", Json());
-    if (version != kVersion)
+    const bool is_older = version == 1 || version == 2;
+    if (version != kVersion && !(is_older && accepted_ == PackageVersions::kKnown))
       throw Error(ErrorCode::kUnsupportedVersion,
                   path_ + ": it has version " + exact_json_text(version) +
                       " of the format, expected version " + std::to_string(kVersion) +
-                      "; publish the file again");
+                      (is_older ? "; publish the file again" : ""));
     PackageIndex index;
     const Json& manifest = member(json, "manifest");
     expect(manifest.is_object(), "'manifest'", "an object");
@@ -172,6 +173,7 @@ class Parser {
   }
 
   const std::string& path_;
+  const PackageVersions accepted_;
 };
 
 }  // namespace
@@ -204,8 +206,8 @@ std::string index_text(const PackageIndex& index) {
   return exact_json_text(json) + "\n";
 }
 
-PackageIndex parse_index(std::string_view text, const std::string& path) {
-  return Parser(path).parse(text);
+PackageIndex parse_index(std::string_view text, const std::string& path, PackageVersions accepted) {
+  return Parser(path, accepted).parse(text);
 }
 
 std::string package_digest(const PackageIndex& index) {

@@ -87,10 +87,14 @@ inline constexpr uint64_t kMaxIndexBytes = uint64_t{8} << 20;
 
 // Returns the text of package.json, in the newest version of the format.
 std::string index_text(const PackageIndex& index);
+// Versions of package.json. The versions 1 to 3 describe their files alike, but only the blocks of
+// version 3 can be read.
+enum class PackageVersions { kReadable, kKnown };
 // Parses the text of package.json, and checks that its numbers are consistent. Throws
-// Error{kCorrupt}, or Error{kUnsupportedVersion} for a version that this program does not know.
-// Error messages begin with `path`.
-PackageIndex parse_index(std::string_view text, const std::string& path);
+// Error{kCorrupt}, or Error{kUnsupportedVersion} for a version that is not one of `accepted`. Error
+// messages begin with `path`.
+PackageIndex parse_index(std::string_view text, const std::string& path,
+                         PackageVersions accepted = PackageVersions::kReadable);
 
 // Returns the digest of a package: 32 hex digits of the SHA-256 of its manifest, with "" as the
 // digest, and of the names of the head, the directory and the packs, which contain hashes.

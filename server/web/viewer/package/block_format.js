@@ -32,11 +32,10 @@ class Columns {
     for (let i = 0; i < count; ++i) {
       const stored = bytes[at++];
       if (stored === 0) throw new Error("A block has a leaf without cells.");
-      for (let byte = 0; byte < 4; ++byte) {
-        if (stored >>> byte & 1) low[i] |= bytes[at++] << 8 * byte;
-      }
-      for (let byte = 0; byte < 4; ++byte) {
-        if (stored >>> 4 + byte & 1) high[i] |= bytes[at++] << 8 * byte;
+      for (let byte = 0; byte < 8; ++byte) {
+        if ((stored >>> byte & 1) === 0) continue;
+        if (bytes[at] === 0) throw new Error("A block stores a byte of a leaf that is 0.");
+        (byte < 4 ? low : high)[i] |= bytes[at++] << 8 * (byte & 3);
       }
     }
     this.take(at - this.at);
@@ -157,6 +156,9 @@ function childStarts(masks, starts) {
 function readNumbers(columns, count, next) {
   const old = columns.take(Math.ceil(count / 8)), numbers = new Uint32Array(count);
   const isOld = (i) => old[i >>> 3] >>> (i & 7) & 1;
+  for (let i = count; i < 8 * old.length; ++i) {
+    if (isOld(i)) throw new Error("A block has a reference after its last leaf.");
+  }
   for (let i = 0; i < count; ++i) {
     numbers[i] = isOld(i) ? columns.takeWord() : next++;
     if (numbers[i] >= next) throw new Error("A block refers to a tile that does not exist.");

@@ -125,6 +125,11 @@ TEST_F(PackageHead, HasTheVersion) {
     write_index("p", index);
     EXPECT_THAT(check_error("p"), testing::HasSubstr("it has version " + std::to_string(version) +
                                                      " of the format, expected version 3"));
+    if (version > 3)
+      EXPECT_THROW(write(*file, spec(*file, "p")), Error);
+    else
+      write(*file, spec(*file, "p"));  // replaces the package
+    EXPECT_EQ(read_index("p").value("version", 0), version > 3 ? version : 3);
   }
 }
 
