@@ -1,5 +1,5 @@
 // Sends requests over HTTP or HTTPS to one server, and keeps the connection open between requests.
-// Used by one thread.
+// Used by one thread, except stop() and received().
 #pragma once
 
 #include <cstdint>

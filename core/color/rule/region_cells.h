@@ -134,7 +134,7 @@ class RegionCells {
   template <class Encoder>
   void take(uint32_t first_code, Encoder& encoder) {
     encoder.reserve(count());
-    ColoredCell others[64];  // cells that are not flat
+    ColoredCell others[64];  // cells that combine() does not combine with their siblings
     size_t waiting = 0;
     const auto add_others = [&] { encoder.add({others, std::exchange(waiting, 0)}, first_code); };
     Siblings siblings;

@@ -114,8 +114,8 @@ VOXDAG_HD inline std::optional<FlatColor> flat_color_of(const FixedSurface& surf
   return color;
 }
 
-// Computes the color of a triangle at its points. The surface, the material
-// and the textures must outlive this object.
+// Computes the color of a triangle at its points. The surface, the material and the textures must
+// outlive this object.
 template <class Textures>
 class SurfaceLook {
  public:
