@@ -105,6 +105,8 @@ struct SampledLooks : TestLooks {
     oracle::Random random(7);
     for (FixedSurface& surface : all) {
       surface.material = static_cast<uint32_t>(random.between(0, 26));
+      // In cells with an edge of 2^15 voxels, a test with masks would take minutes.
+      if (grid.levels == 20 && surface.material % 3 == 2) --surface.material;
       if (random.coin()) continue;
       for (SurfaceCorner& corner : surface.corners) corner.color = SurfaceCorner{}.color;
     }
