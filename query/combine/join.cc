@@ -68,14 +68,12 @@ class HashCursor {
 
   // Returns the node or the brick at `words`, with its children's offsets in the visited file.
   Row row_of(const uint32_t* words, uint64_t hash) const {
-    if (!lookups_) return {hash, 0, 1, {brick_at(words)}};
+    if (!lookups_)
+      return brick_row(words[0] | static_cast<uint64_t>(words[1]) << 32, input_.file().hash_bits());
     const voxdag_reader::Node node{words[0], words + 1, cursor_.is_wide()};
     Row row{hash, node.child_mask, kPopcount8[node.child_mask], {}};
     for (uint32_t i = 0; i < row.count; ++i) row.children[i] = node.child(static_cast<int>(i));
     return row;
-  }
-  static uint64_t brick_at(const uint32_t* words) {
-    return words[0] | static_cast<uint64_t>(words[1]) << 32;
   }
   void announce() {
     if (!lookups_->needs_announcement()) return;
@@ -101,7 +99,7 @@ class HashCursor {
   }
   void load_brick() {
     const uint64_t brick = cursor_.brick();
-    hash_ = truncate_hash(hash_brick(brick), input_.file().hash_bits());
+    hash_ = brick_row(brick, input_.file().hash_bits()).hash;
     is_comparable_ = true;
     is_full_ = brick == ~uint64_t{0};
   }
