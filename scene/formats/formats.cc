@@ -111,15 +111,10 @@ std::unique_ptr<TriangleSource> open_scene(FileSystem& files, const std::vector<
                                            const SceneOptions& options, MemoryBudget& budget,
                                            const CancelToken& cancel) {
   Parts parts;
-  uint64_t small_bytes = std::min(kSmallSceneBytes, budget.available() / 16);
+  SmallFiles small_files(kSmallSceneBytes, budget);
   for (const std::string& path : paths) {
     cancel.check();
-    std::unique_ptr<ReadableFile> file = files.open_read(path);
-    const uint64_t bytes = file->size();
-    if (bytes <= small_bytes) {
-      file = read_if_small(std::move(file), bytes, budget);
-      small_bytes -= bytes;
-    }
+    std::unique_ptr<ReadableFile> file = small_files.read(files.open_read(path));
     const SceneFormat& format = format_of(*file);
     parts.push_back(format.open(files, std::move(file), options, budget, cancel));
   }

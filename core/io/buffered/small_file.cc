@@ -29,12 +29,13 @@ class FileInMemory : public ForwardingReader {
 
 }  // namespace
 
-std::unique_ptr<ReadableFile> read_if_small(std::unique_ptr<ReadableFile> file, uint64_t max_bytes,
-                                            MemoryBudget& budget) {
+std::unique_ptr<ReadableFile> SmallFiles::read(std::unique_ptr<ReadableFile> file) {
   const uint64_t bytes = file->size();
-  if (bytes == 0 || bytes > max_bytes || bytes > budget.available() / 16) return file;
-  PageBuffer<std::byte> buffer(budget, bytes, "a small file");
-  return std::make_unique<FileInMemory>(std::move(file), std::move(buffer));
+  if (bytes == 0 || bytes > left_bytes_) return file;
+  PageBuffer<std::byte> buffer(budget_, bytes, "a small file");
+  file = std::make_unique<FileInMemory>(std::move(file), std::move(buffer));
+  left_bytes_ -= bytes;
+  return file;
 }
 
 }  // namespace voxdag

@@ -103,11 +103,12 @@ void merge_artifacts(BuildJob& job, GlobalFileWriter& out) {
   uint64_t bytes = 0;
   for (const ArtifactRef& artifact : inputs.artifacts) bytes += artifact.bytes;
   const bool is_small = bytes <= kSmallMergeBytes;
+  SmallFiles small_files(kSmallMergeBytes, job.budget);
   std::map<uint32_t, std::shared_ptr<ReadableFile>> small_segments;  // each is read once
   inputs.open_segment = [&, is_small](uint32_t id) -> std::shared_ptr<ReadableFile> {
     if (!is_small) return job.work.open_segment(id);
     std::shared_ptr<ReadableFile>& segment = small_segments[id];
-    if (!segment) segment = read_if_small(job.work.open_segment(id), kSmallMergeBytes, job.budget);
+    if (!segment) segment = small_files.read(job.work.open_segment(id));
     return segment;
   };
   inputs.scratch_folder = job.work.scratch_path();

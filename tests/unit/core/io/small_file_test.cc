@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "tests/support/error_of.h"
 
@@ -40,7 +42,8 @@ TEST(SmallFile, IsReadOnce) {
   MemoryBudget budget(1 << 20);
   int reads = 0;
   {
-    const auto file = read_if_small(std::make_unique<CountedFile>("0123456789", reads), 10, budget);
+    const auto file =
+        SmallFiles(10, budget).read(std::make_unique<CountedFile>("0123456789", reads));
     EXPECT_EQ(budget.used(), 10u);
     EXPECT_EQ(bytes_at(*file, 0, 10), "0123456789");
     EXPECT_EQ(bytes_at(*file, 3, 4), "3456");
@@ -65,13 +68,25 @@ TEST(SmallFile, OtherFilesAreReadInParts) {
   for (MemoryBudget* budget : {&small, &large}) {
     const size_t size = budget == &small ? 100 : bytes.size();
     const auto file =
-        read_if_small(std::make_unique<CountedFile>(bytes.substr(0, size), reads), 5000, *budget);
+        SmallFiles(5000, *budget).read(std::make_unique<CountedFile>(bytes.substr(0, size), reads));
     EXPECT_EQ(budget->used(), 0u);
     EXPECT_EQ(reads, 0);
     EXPECT_EQ(bytes_at(*file, 0, 3), "xxx");
     EXPECT_EQ(reads, 1);
     reads = 0;
   }
+}
+
+// Files that fit are read into memory even if an earlier file did not fit.
+TEST(SmallFile, AllFilesTogetherAreLimited) {
+  int reads = 0;
+  MemoryBudget budget(1 << 20);
+  SmallFiles files(100, budget);
+  std::vector<std::unique_ptr<ReadableFile>> open;
+  for (const size_t size : {60u, 50u, 40u, 1u})
+    open.push_back(files.read(std::make_unique<CountedFile>(std::string(size, 'x'), reads)));
+  EXPECT_EQ(budget.used(), 100u);
+  EXPECT_EQ(reads, 2);
 }
 
 }  // namespace
