@@ -145,6 +145,10 @@ class Merger {
   MergeRecovery recovery_;
 };
 
+MergeMemory plan_of(const MergeInputs& inputs, const MemoryBudget& budget, unsigned threads) {
+  return MergeMemory::divide(budget.available(), threads, inputs.useful_partition_bytes);
+}
+
 }  // namespace
 
 MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalFileWriter& out,
@@ -154,7 +158,7 @@ MergeReport merge_sub_dags(const MergeInputs& inputs, FileSystem& files, GlobalF
   if (inputs.artifacts.empty()) return report;
   ScratchFolder scratch(files, inputs.scratch_folder);
   MergeProgress rows_merged(progress);
-  const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
+  const MergeContext context{scratch,     budget, plan_of(inputs, budget, threads),
                              rows_merged, cancel, report};
   Merger(inputs, context, out.narrow_words(), checkpoint).run(out);
   report.scratch_bytes += scratch.bytes_written();
@@ -166,7 +170,7 @@ ArtifactRef merge_to_artifact(const MergeInputs& inputs, FileSystem& files, Segm
                               const CancelToken& cancel, MergeReport& report) {
   ScratchFolder scratch(files, inputs.scratch_folder);
   MergeProgress rows_merged(progress);
-  const MergeContext context{scratch,     budget, MergeMemory::divide(budget.available(), threads),
+  const MergeContext context{scratch,     budget, plan_of(inputs, budget, threads),
                              rows_merged, cancel, report};
   // With a `narrow_words` of UINT64_MAX no level is wide: positions in an artifact are row indices,
   // which have 32 bits.

@@ -187,8 +187,9 @@ class OneLevel {
     MergeReport report;
     NoProgress silent;
     MergeProgress progress(silent);
-    const MergeContext context{scratch_, budget_, MergeMemory::divide(budget_.available(), 1),
-                               progress, cancel_, report};
+    const MergeContext context{
+        scratch_, budget_, MergeMemory::divide(budget_.available(), 1, UINT64_MAX),
+        progress, cancel_, report};
     merge_level(context, {1, {.bricks = bricks}, pointers_, &*below_, *maps_, nowhere, memory_});
   }
 

@@ -237,16 +237,26 @@ uint64_t bytes_for_workers(const MergeMemory& plan) {
 }
 
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
-  for (const LevelRun* run : task.runs) context.report.input_nodes += run->rows();
+  LevelRows rows;
+  for (const LevelRun* run : task.runs) rows.add(run->count({0, run->frames().size()}));
+  context.report.input_nodes += rows.total().rows;
   const uint64_t available = context.budget.available() + task.memory.bytes();
   const uint64_t for_workers = bytes_for_workers(context.plan);
   const uint64_t partition_bytes =
       MergeMemory::partition_bytes_within(available - std::min(available, for_workers));
+  const uint32_t position_words = held_position_words(task);
+  const uint64_t useful_bytes =
+      std::min(partition_bytes, rows.useful_bytes(context.plan, position_words));
+  const auto widest_interval = [&](uint64_t first) {
+    const auto useful =
+        HashPartition::widest_interval(task.runs, first, useful_bytes, position_words);
+    if (useful || useful_bytes == partition_bytes) return useful;
+    return HashPartition::widest_interval(task.runs, first, partition_bytes, position_words);
+  };
   LevelExtent extent;
   HashInterval done{0, 0};
   for (uint64_t first = 0;; first = done.last + 1) {
-    const auto interval = HashPartition::widest_interval(task.runs, first, partition_bytes,
-                                                         held_position_words(task));
+    const auto interval = widest_interval(first);
     LevelExtent part;
     if (interval) {
       done = *interval;

@@ -87,23 +87,26 @@ class Pass {
     return output_.in_words() ? rows.rows + rows.words : rows.rows;
   }
 
-  // If the budget has enough memory for a hash partition of all rows of the largest level,
-  // allocates it now, and all partitions use it. Otherwise a partition allocates new memory if it
-  // is larger than all earlier partitions.
+  // If the budget has enough memory for a hash partition of useful size on every level, allocates
+  // it now, and all partitions use it. Otherwise a partition allocates new memory if it is larger
+  // than all earlier partitions.
   void reserve_memory() {
-    std::vector<RowCount> levels(task_.shape.grid_levels);
+    std::vector<LevelRows> levels(task_.shape.grid_levels);
     for (const ArtifactReader& artifact : task_.artifacts)
       for (const ArtifactLevel& level : artifact.levels())
         levels[level.level].add({level.rows, std::max(level.children, kBrickWords * level.rows)});
-    RowCount max;
-    for (const RowCount& level : levels) max.raise_to(level);
+    RowCount max, useful;
+    for (const LevelRows& level : levels) {
+      max.raise_to(level.total());
+      useful.raise_to(level.useful_rows(context_.plan));
+    }
     if (output_.is_wide(max_positions(max))) return;
     const bool resident = max.rows * sizeof(uint32_t) <= context_.plan.resident_bytes;
-    const uint64_t bytes = HashPartition::bytes_for(max, 0);
+    const uint64_t bytes = HashPartition::bytes_for(useful, 0);
     if (resident && bytes <= kMaxPartitionBytes &&
         bytes + bytes_besides_partition() + context_.plan.resident_bytes <=
             context_.budget.available())
-      memory_.reserve(max, 0, context_.budget);
+      memory_.reserve(useful, 0, context_.budget);
   }
 
   // Returns the bytes that merging a level needs in addition to the hash partition: the workers'

@@ -53,7 +53,8 @@
 //   merge         MergeMemory, of free
 //                   workers, together               1/4                          merge
 //                   positions of two levels         1/6 for each; then spilled   merge
-//                   hash partition                  the rest, less 1/16          merge
+//                   hash partition                  the rest, less 1/16, up to   merge
+//                                                   the useful size (LevelRows)
 //
 // "Free" is the part of the budget still available when a stage allocates. A fraction without "of"
 // is a fraction of the budget, or, in an indented row, of the part above. "The rest" is the memory

@@ -53,9 +53,25 @@ constexpr double kEncloseBytesPerNode = 150;
 // again, and the memory of both is in use, or not yet returned to the system, at the peak.
 // Measured: 2.0. The rest is for the memory of the workers.
 constexpr double kTriangleCopies = 2.4;
-// Peak memory of the merge per node of the global DAG, and memory of a process without a scene.
+// Peak memory per node of the global DAG. It falls when a hash partition of the merge no longer has
+// the rows of a complete level. From then on, it depends on how many nodes occur in several
+// subvolumes, and on the tables of the largest subvolumes.
 constexpr double kMemoryBytesPerNode = 26;
+constexpr double kNodesOfAPartition = 5e6;
+constexpr EstimateRange kMemoryBytesPerFurtherNode = {5, 9, 14};
+// Memory of a process without a scene.
 constexpr double kBaseMemoryBytes = 24e6;
+
+// Returns the peak memory of the stages build and merge for a DAG with this number of nodes.
+EstimateRange memory_of_nodes(const EstimateRange& nodes) {
+  const auto memory = [](double count, double per_further_node) {
+    const double first = std::min(count, kNodesOfAPartition);
+    return kMemoryBytesPerNode * first + per_further_node * (count - first);
+  };
+  const EstimateRange& further = kMemoryBytesPerFurtherNode;
+  return {memory(nodes.low, further.low), memory(nodes.likely, further.likely),
+          memory(nodes.high, further.high)};
+}
 
 // Extrapolates a count that grows as a R^2 + b R. `coarse` and `fine` are the counts of the two
 // pilots, which determine a and b. `doublings` is the number of doublings of R from the finer
@@ -302,7 +318,7 @@ Estimate estimate_build(const BuildSpec& spec, const PreparedScene& scene, Build
       std::max(scene.state.counts.triangles, scene.triangles->count(kSceneBin));
   const double triangle_bytes =
       static_cast<double>(scene.triangles->record_bytes()) * static_cast<double>(records);
-  estimate.memory_bytes = kMemoryBytesPerNode * estimate.dag_nodes +
+  estimate.memory_bytes = memory_of_nodes(estimate.dag_nodes) +
                           exactly(kTriangleCopies * triangle_bytes) + costs.memory_bytes;
   if (is_solid) {
     const SolidNeeds needs = solid_needs(options, scene, costs, context);

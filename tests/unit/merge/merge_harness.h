@@ -27,6 +27,7 @@ struct MergeOptions {
   CancelToken* cancel = nullptr;
   Checkpoint* checkpoint = nullptr;
   Progress* progress = nullptr;
+  uint64_t useful_partition_bytes = MergeInputs().useful_partition_bytes;
   double checkpoint_interval_s = 0;  // 0: saves after every level, and waits for each save
 };
 
@@ -152,6 +153,7 @@ class MergeHarness {
       return system_files().open_read(segment_path(folder_.path(), id));
     };
     inputs.scratch_folder = scratch_folder();
+    inputs.useful_partition_bytes = options.useful_partition_bytes;
     inputs.checkpoint_interval_s = options.checkpoint_interval_s;
     MemoryBudget budget(options.budget_bytes);
     GlobalFileWriter out(system_files(), merged_file(), grid_, hash_bits_, narrow_words_);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/dag/node_hash.h"
+#include "merge/plan/merge_memory.h"
 #include "tests/unit/merge/merge_harness.h"
 
 namespace voxdag {
@@ -29,6 +30,44 @@ TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
       EXPECT_GT(small.report.scratch_bytes, 0u);
     }
   }
+}
+
+// With enough memory for whole levels, partitions have the useful size. Smaller ones would have
+// less than four frames of a run. A group of equal hashes that is larger is still merged in memory.
+TEST(MergeMemory, PartitionsHaveTheUsefulSize) {
+  const oracle::Voxels voxels = noise_voxels(4, 256);
+  for (const uint32_t hash_bits : {6u, 64u}) {
+    SCOPED_TRACE("hash bits " + std::to_string(hash_bits));
+    MergeHarness harness(8, hash_bits);
+    harness.add(voxels, equal_cubes(1));
+    const Merged whole = harness.merge();
+    EXPECT_EQ(whole.report.hash_partitions, 7u);  // one per level
+    const Merged useful = harness.merge({.useful_partition_bytes = kMiB});
+    EXPECT_EQ(useful.file.sha256, whole.file.sha256);
+    // Each of the eight runs has 32768 bricks in eight frames and 4096 nodes in one frame, so two
+    // or three partitions of the bricks have at most four frames of each run.
+    EXPECT_GE(useful.report.hash_partitions, 8u);
+    EXPECT_LE(useful.report.hash_partitions, 10u);
+    EXPECT_EQ(useful.report.passes, 1u);
+    EXPECT_EQ(useful.report.streamed_groups, 0u);
+    EXPECT_EQ(useful.report.scratch_bytes, 0u);
+  }
+}
+
+// The useful size grows with the number of frames, and not with runs of few rows.
+TEST(MergeMemory, UsefulSizeOfALevel) {
+  MergeMemory plan;
+  plan.useful_partition_bytes = kMiB;
+  LevelRows rows;
+  EXPECT_EQ(rows.useful_bytes(plan, 0), kMiB);
+  for (int run = 0; run < 100; ++run) rows.add({10 * kFrameRows, 40 * kFrameRows});
+  const uint64_t frame = HashPartition::bytes_for({kFrameRows, 4 * kFrameRows}, 0);
+  EXPECT_EQ(rows.useful_bytes(plan, 0), 400 * (frame + 1));
+  EXPECT_GT(rows.useful_bytes(plan, 2), rows.useful_bytes(plan, 0));
+  EXPECT_NEAR(static_cast<double>(rows.useful_rows(plan).rows), 400.0 * kFrameRows * 33 / 32, 100);
+  plan.useful_partition_bytes = 2000 * frame;
+  EXPECT_EQ(rows.useful_bytes(plan, 0), 2000 * frame);
+  EXPECT_EQ(rows.useful_rows(plan).rows, rows.total().rows);
 }
 
 // Too many artifacts for one pass are merged in several passes.

@@ -63,12 +63,12 @@ TEST(MemoryPlan, DividesAWorkersShare) {
 }
 
 TEST(MemoryPlan, DividesTheMergesBudget) {
-  const MergeMemory small = MergeMemory::divide(64 * kMiB, 2);
+  const MergeMemory small = MergeMemory::divide(64 * kMiB, 2, kMiB);
   EXPECT_EQ(small.workers, 2u);
   EXPECT_EQ(small.worker_bytes, 8 * kMiB);
   EXPECT_EQ(small.resident_bytes, 64 * kMiB / 6);
   EXPECT_EQ(small.partition_bytes, 26214402u);
-  const MergeMemory large = MergeMemory::divide(12 * kGiB, 16);
+  const MergeMemory large = MergeMemory::divide(12 * kGiB, 16, kMiB);
   EXPECT_EQ(large.workers, 16u);
   EXPECT_EQ(large.worker_bytes, 192 * kMiB);
   EXPECT_EQ(large.resident_bytes, 2 * kGiB);
@@ -97,7 +97,7 @@ TEST(MemoryPlan, PartsFitTheWhole) {
       EXPECT_LE(BackendMemory::table_bytes(share) + BackendMemory::block_memo_bytes(share) +
                     4 * BackendMemory::plane_table_bytes(share, share),
                 share);
-      const MergeMemory merge = MergeMemory::divide(budget, threads);
+      const MergeMemory merge = MergeMemory::divide(budget, threads, kMiB);
       EXPECT_LE(
           merge.workers * merge.worker_bytes + 2 * merge.resident_bytes + merge.partition_bytes,
           budget);
