@@ -171,7 +171,8 @@ void decode_value(const Field& field, const FieldJson& json, Members members, T&
 // A visitor that finds members of nested objects by their name.
 class NestedMemberFinder {
  public:
-  explicit NestedMemberFinder(std::string name) : name_(std::move(name)) {}
+  // `name` must outlive this object.
+  explicit NestedMemberFinder(const std::string& name) : name_(name) {}
 
   template <class T>
   void operator()(const Field& field, T& value) {
@@ -196,7 +197,7 @@ class NestedMemberFinder {
     prefix_ = outer;
   }
 
-  const std::string name_;
+  const std::string& name_;
   std::string prefix_, path_;
 };
 

@@ -1,10 +1,11 @@
 // The merge under small budgets gives the same bytes with several hash partitions, several passes,
 // spilled position maps and streamed groups (MergeReport::streamed_groups). The report must show
 // that each of these happened.
+#include "merge/plan/merge_memory.h"
+
 #include <gtest/gtest.h>
 
 #include "core/dag/node_hash.h"
-#include "merge/plan/merge_memory.h"
 #include "tests/unit/merge/merge_harness.h"
 
 namespace voxdag {
