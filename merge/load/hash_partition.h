@@ -8,8 +8,7 @@
 // rows at its ends can be outside the interval.
 //
 // Within a slice rows are in the order of their hashes, so each bucket is a contiguous part of
-// every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice). Usually one partition is
-// the whole hash space.
+// every slice: from bucket_begin(b, slice) to bucket_begin(b + 1, slice).
 #pragma once
 
 #include <cstdint>

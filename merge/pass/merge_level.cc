@@ -245,12 +245,17 @@ LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
   const uint64_t partition_bytes =
       MergeMemory::partition_bytes_within(available - std::min(available, for_workers));
   const uint32_t position_words = held_position_words(task);
+  // Every partition loads all spilled maps of the level below, so then the number of partitions
+  // should be small.
+  const bool is_spilled = task.child_maps && !task.child_maps->is_resident();
   const uint64_t useful_bytes =
-      std::min(partition_bytes, rows.useful_bytes(context.plan, position_words));
+      is_spilled ? partition_bytes
+                 : std::min(partition_bytes, rows.useful_bytes(context.plan, position_words));
   const auto widest_interval = [&](uint64_t first) {
     const auto useful =
         HashPartition::widest_interval(task.runs, first, useful_bytes, position_words);
     if (useful || useful_bytes == partition_bytes) return useful;
+    // The rows with hash `first` alone take more than the useful size.
     return HashPartition::widest_interval(task.runs, first, partition_bytes, position_words);
   };
   LevelExtent extent;

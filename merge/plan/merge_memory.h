@@ -50,25 +50,25 @@ struct MergeMemory {
 // The rows of all runs of one level, and the useful size of the level's hash partitions.
 class LevelRows {
  public:
-  // A frame at the border of two partitions is decoded twice. With this many frames of each run in
-  // a partition, at most a quarter of the frames are.
-  static constexpr uint64_t kUsefulFramesPerRun = 4;
-
   // Adds a run.
   void add(const RowCount& run) {
-    const uint64_t frames = (run.rows + kFrameRows - 1) / kFrameRows;
+    if (run.rows == 0) return;
     total_.add(run);
-    frames_ += frames;
-    useful_frames_ += std::min(frames, kUsefulFramesPerRun);
+    frames_ += (run.rows + kFrameRows - 1) / kFrameRows;
+    ++runs_;
   }
   const RowCount& total() const { return total_; }
 
   // Returns the size up to which more memory for a partition makes the merge faster.
   // `position_words`: as for HashPartition::bytes_for().
   uint64_t useful_bytes(const MergeMemory& plan, uint32_t position_words) const {
-    if (frames_ == 0) return plan.useful_partition_bytes;
-    const uint64_t frame_bytes = HashPartition::bytes_for(total_, position_words) / frames_ + 1;
-    return std::max(plan.useful_partition_bytes, useful_frames_ * frame_bytes);
+    if (runs_ == 0) return plan.useful_partition_bytes;
+    const uint64_t bytes = HashPartition::bytes_for(total_, position_words);
+    // Where two partitions meet, a frame of each run is decoded for both. With this number of
+    // partitions, at most a quarter of the frames are decoded twice.
+    const uint64_t max_partitions = 1 + frames_ / (4 * runs_);
+    const uint64_t shared_bytes = (bytes / frames_ + 1) * runs_;
+    return std::max(plan.useful_partition_bytes, bytes / max_partitions + shared_bytes);
   }
   // Returns the expected size of a partition of useful_bytes() without positions. Adds 1/32,
   // because the numbers of rows and words vary from partition to partition.
@@ -84,7 +84,7 @@ class LevelRows {
  private:
   RowCount total_;
   uint64_t frames_ = 0;
-  uint64_t useful_frames_ = 0;  // at most kUsefulFramesPerRun of each run
+  uint64_t runs_ = 0;  // runs with rows
 };
 
 }  // namespace voxdag

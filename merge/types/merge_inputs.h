@@ -23,8 +23,8 @@ struct MergeInputs {
   // A folder for data that does not fit in memory. No other merge may use it at the same time.
   // After the merge it contains only files named by the state in the checkpoint.
   std::string scratch_folder;
-  // Size above which a hash partition does not make the merge faster, if it has several frames of
-  // each run. Above this size the merge is slower, because the system has to provide more pages.
+  // Size of a hash partition above which the merge is not faster, if there are not many runs
+  // (LevelRows). Above this size it is slower, because the system has to provide more pages.
   uint64_t useful_partition_bytes = uint64_t{128} << 20;
   // Minimum CPU time between two checkpoints, in seconds.
   double checkpoint_interval_s = 2;

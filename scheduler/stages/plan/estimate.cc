@@ -10,6 +10,7 @@
 #include "core/dag/brick.h"
 #include "core/fields/json_fields.h"
 #include "core/fields/json_text.h"
+#include "core/format/artifact/artifact.h"
 #include "core/format/global/global_layout.h"
 #include "scheduler/solid/row_sums.h"
 #include "scheduler/solid/solid_report.h"
@@ -53,20 +54,30 @@ constexpr double kEncloseBytesPerNode = 150;
 // again, and the memory of both is in use, or not yet returned to the system, at the peak.
 // Measured: 2.0. The rest is for the memory of the workers.
 constexpr double kTriangleCopies = 2.4;
-// Peak memory per node of the global DAG. It falls when a hash partition of the merge no longer has
-// the rows of a complete level. From then on, it depends on how many nodes occur in several
-// subvolumes, and on the tables of the largest subvolumes.
+// Peak memory per node of the global DAG, if a hash partition of the merge has the rows of a
+// complete level. This is so for the first kNodesOfAPartition nodes, and for more nodes if the
+// subvolumes are small (LevelRows). Otherwise further nodes need less memory. How much depends on
+// how many nodes occur in several subvolumes, and on the tables of the largest subvolumes.
 constexpr double kMemoryBytesPerNode = 26;
 constexpr double kNodesOfAPartition = 5e6;
 constexpr EstimateRange kMemoryBytesPerFurtherNode = {5, 9, 14};
+// The largest level's share of the rows of all artifacts.
+constexpr double kLargestLevelShare = 0.4;
 // Memory of a process without a scene.
 constexpr double kBaseMemoryBytes = 24e6;
 
-// Returns the peak memory of the stages build and merge for a DAG with this number of nodes.
-EstimateRange memory_of_nodes(const EstimateRange& nodes) {
-  const auto memory = [](double count, double per_further_node) {
+// Returns the peak memory of the stages build and merge for a DAG with this number of nodes, whose
+// `subvolumes` artifacts have `artifact_nodes` nodes.
+EstimateRange memory_of_nodes(const EstimateRange& nodes, double artifact_nodes,
+                              double subvolumes) {
+  const double frames = std::max(1.0, kLargestLevelShare * artifact_nodes / kFrameRows);
+  const double frames_per_run = frames / std::clamp(subvolumes, 1.0, frames);
+  // The part of a level in one partition, as in LevelRows::useful_bytes().
+  const double part = std::min(1.0, 1 / (1 + frames_per_run / 4) + 1 / frames_per_run);
+  const auto memory = [part](double count, double per_further_node) {
     const double first = std::min(count, kNodesOfAPartition);
-    return kMemoryBytesPerNode * first + per_further_node * (count - first);
+    return std::max(kMemoryBytesPerNode * first + per_further_node * (count - first),
+                    kMemoryBytesPerNode * count * part);
   };
   const EstimateRange& further = kMemoryBytesPerFurtherNode;
   return {memory(nodes.low, further.low), memory(nodes.likely, further.likely),
@@ -305,9 +316,9 @@ Estimate estimate_build(const BuildSpec& spec, const PreparedScene& scene, Build
       std::min(pilot_bytes * std::pow(kBytesGrowthPerDoubling, doublings), kMaxBytesPerNode));
   estimate.file_bytes = file_size(bytes * estimate.dag_nodes, scene.state.grid.levels);
 
+  const double subvolumes = expected_subvolumes(scene, spec.run.subvolume_edge);
   const SubvolumeCosts costs =
-      estimate_subvolumes(expected_subvolumes(scene, spec.run.subvolume_edge),
-                          estimate.svo_nodes.likely, estimate.dag_nodes);
+      estimate_subvolumes(subvolumes, estimate.svo_nodes.likely, estimate.dag_nodes);
   estimate.disk_bytes = estimate.file_bytes + costs.artifact_bytes + triangles_on_disk(scene);
   // Adds the merge's file and the nodes that are being reordered. Both have about the size of the
   // output file.
@@ -318,8 +329,9 @@ Estimate estimate_build(const BuildSpec& spec, const PreparedScene& scene, Build
       std::max(scene.state.counts.triangles, scene.triangles->count(kSceneBin));
   const double triangle_bytes =
       static_cast<double>(scene.triangles->record_bytes()) * static_cast<double>(records);
-  estimate.memory_bytes = memory_of_nodes(estimate.dag_nodes) +
-                          exactly(kTriangleCopies * triangle_bytes) + costs.memory_bytes;
+  estimate.memory_bytes =
+      memory_of_nodes(estimate.dag_nodes, costs.artifact_nodes.likely, subvolumes) +
+      exactly(kTriangleCopies * triangle_bytes) + costs.memory_bytes;
   if (is_solid) {
     const SolidNeeds needs = solid_needs(options, scene, costs, context);
     estimate.disk_bytes = estimate.disk_bytes + needs.disk_bytes;

@@ -33,8 +33,7 @@ TEST(MergeMemory, HashPartitionsGiveTheSameBytes) {
   }
 }
 
-// With enough memory for whole levels, partitions have the useful size. Smaller ones would have
-// less than four frames of a run. A group of equal hashes that is larger is still merged in memory.
+// With enough memory for whole levels, partitions have the useful size.
 TEST(MergeMemory, PartitionsHaveTheUsefulSize) {
   const oracle::Voxels voxels = noise_voxels(4, 256);
   for (const uint32_t hash_bits : {6u, 64u}) {
@@ -43,32 +42,63 @@ TEST(MergeMemory, PartitionsHaveTheUsefulSize) {
     harness.add(voxels, equal_cubes(1));
     const Merged whole = harness.merge();
     EXPECT_EQ(whole.report.hash_partitions, 7u);  // one per level
-    const Merged useful = harness.merge({.useful_partition_bytes = kMiB});
+    const Merged useful = harness.merge({.useful_partition_bytes = 1});
     EXPECT_EQ(useful.file.sha256, whole.file.sha256);
-    // Each of the eight runs has 32768 bricks in eight frames and 4096 nodes in one frame, so two
-    // or three partitions of the bricks have at most four frames of each run.
+    // Each of the eight runs has 32768 bricks in eight frames, and its nodes are in one frame per
+    // level. So only the bricks have several partitions, and about three.
     EXPECT_GE(useful.report.hash_partitions, 8u);
     EXPECT_LE(useful.report.hash_partitions, 10u);
     EXPECT_EQ(useful.report.passes, 1u);
     EXPECT_EQ(useful.report.streamed_groups, 0u);
     EXPECT_EQ(useful.report.scratch_bytes, 0u);
+    // A partition is never larger than its memory.
+    const Merged small = harness.merge({.budget_bytes = 5 * kMiB, .useful_partition_bytes = 1});
+    EXPECT_EQ(small.file.sha256, whole.file.sha256);
+    EXPECT_GE(small.report.hash_partitions, useful.report.hash_partitions);
   }
 }
 
-// The useful size grows with the number of frames, and not with runs of few rows.
+// A group of equal hashes that is larger than the useful size is merged in memory if it fits.
+TEST(MergeMemory, AGroupOfEqualHashesLargerThanTheUsefulSize) {
+  const oracle::Voxels voxels = noise_voxels(5, 256);
+  MergeHarness harness(8, 4);
+  harness.add(voxels, {Cube{}});
+  const Merged whole = harness.merge();
+  const Merged useful = harness.merge({.useful_partition_bytes = 1});
+  EXPECT_EQ(useful.file.sha256, whole.file.sha256);
+  // 16 groups of bricks have five or six of the 64 frames each, and a partition of useful size has
+  // less than five. So the bricks are one partition, although their groups could be streamed.
+  EXPECT_LT(useful.report.hash_partitions, 16u);
+  EXPECT_EQ(useful.report.streamed_groups, 0u);
+}
+
+// The useful size grows with the number of frames and of runs.
 TEST(MergeMemory, UsefulSizeOfALevel) {
+  const auto bytes_of = [](uint64_t frames) {
+    return HashPartition::bytes_for({frames * kFrameRows, 4 * frames * kFrameRows}, 0);
+  };
   MergeMemory plan;
   plan.useful_partition_bytes = kMiB;
   LevelRows rows;
+  rows.add({});
   EXPECT_EQ(rows.useful_bytes(plan, 0), kMiB);
   for (int run = 0; run < 100; ++run) rows.add({10 * kFrameRows, 40 * kFrameRows});
-  const uint64_t frame = HashPartition::bytes_for({kFrameRows, 4 * kFrameRows}, 0);
-  EXPECT_EQ(rows.useful_bytes(plan, 0), 400 * (frame + 1));
+  // 250 of the 1000 frames may be decoded twice, so there are at most three partitions. Each has a
+  // third of the frames, and one more frame of each run.
+  EXPECT_EQ(rows.useful_bytes(plan, 0), bytes_of(1000) / 3 + bytes_of(100) + 100);
   EXPECT_GT(rows.useful_bytes(plan, 2), rows.useful_bytes(plan, 0));
-  EXPECT_NEAR(static_cast<double>(rows.useful_rows(plan).rows), 400.0 * kFrameRows * 33 / 32, 100);
-  plan.useful_partition_bytes = 2000 * frame;
-  EXPECT_EQ(rows.useful_bytes(plan, 0), 2000 * frame);
+  EXPECT_NEAR(static_cast<double>(rows.useful_rows(plan).rows),
+              (1000.0 / 3 + 100) * kFrameRows * 33 / 32, 100);
+  plan.useful_partition_bytes = bytes_of(2000);
+  EXPECT_EQ(rows.useful_bytes(plan, 0), bytes_of(2000));
   EXPECT_EQ(rows.useful_rows(plan).rows, rows.total().rows);
+
+  // If most runs have only one frame, every partition would decode most of the frames.
+  plan.useful_partition_bytes = kMiB;
+  LevelRows skewed;
+  for (int run = 0; run < 1000; ++run) skewed.add({kFrameRows, 4 * kFrameRows});
+  skewed.add({300 * kFrameRows, 1200 * kFrameRows});
+  EXPECT_GE(skewed.useful_bytes(plan, 0), bytes_of(1300));
 }
 
 // Too many artifacts for one pass are merged in several passes.
