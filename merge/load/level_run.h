@@ -51,6 +51,8 @@ class LevelRun {
     return {rows_before(frames.end) - rows_before(frames.begin),
             words_before(frames.end) - words_before(frames.begin)};
   }
+  // Returns the number of all rows and words.
+  RowCount size() const { return count({0, frames_.size()}); }
   // Returns all frames that can have rows with a hash in the interval, judged by the first hash of
   // each frame.
   FrameSpan frames_within(const HashInterval& interval) const;

@@ -238,7 +238,7 @@ uint64_t bytes_for_workers(const MergeMemory& plan) {
 
 LevelExtent merge_level(const MergeContext& context, const LevelTask& task) {
   LevelRows rows;
-  for (const LevelRun* run : task.runs) rows.add(run->count({0, run->frames().size()}));
+  for (const LevelRun* run : task.runs) rows.add(run->size());
   context.report.input_nodes += rows.total().rows;
   const uint64_t available = context.budget.available() + task.memory.bytes();
   const uint64_t for_workers = bytes_for_workers(context.plan);

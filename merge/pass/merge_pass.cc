@@ -57,7 +57,7 @@ class Pass {
     RowCount total;
     for (const LevelRun* run : runs) {
       rows.push_back(run->rows());
-      total.add(run->count({0, run->frames().size()}));
+      total.add(run->size());
     }
 
     PositionMaps maps(rows, output_.is_wide(max_positions(total)), context_.plan.resident_bytes,
